@@ -23,6 +23,7 @@ RULES = {
     "failed": "an update that was refused is not applied",
     "model": "a read equals the result of all updates up to its revision",
     "equal": "all daemons answer alike at one revision",
+    "tick": "a scene's tick never goes down, and each revision has one tick",
     "fresh": "a read with leader_only sees every update that was acknowledged before it was asked",
     "at_least": "a read with at_least is answered from that revision or a later one",
     "exactly": "a read with exactly is answered from that revision",
@@ -126,10 +127,10 @@ class SceneCheck:
                          " and ".join(f"#{number}" for number in firsts), *firsts)
             whole = [number for number in acks if not (self.calls[number].duplicate and self.calls[number].applied == 0)]
             kept = {number: (self.calls[number].epoch, self.calls[number].revision, self.calls[number].tick,
-                             self.calls[number].applied) for number in whole}
+                             self.calls[number].applied, self.calls[number].refused) for number in whole}
             for number in whole[1:]:
                 if kept[number] != kept[whole[0]]:
-                    self.add("same_ack", f"the acks of #{whole[0]} and #{number} (epoch, revision, tick, applied) are "
+                    self.add("same_ack", f"the acks of #{whole[0]} and #{number} (epoch, revision, tick, applied, refused) are "
                              f"{kept[whole[0]]} and {kept[number]}", whole[0], number)
 
     def check_tokens(self):
@@ -171,8 +172,6 @@ class SceneCheck:
             entries = [((call.epoch, call.revision, item), value) for item, value in call.answer.items()]
             if call.question:
                 entries.append(((call.epoch, call.revision, call.question), call.digest))
-            if call.tick is not None:
-                entries.append(((call.epoch, call.revision, "tick"), call.tick))
             for key, value in entries:
                 other, seen = first.setdefault(key, (number, value))
                 if seen != value:
@@ -215,6 +214,7 @@ class EpochCheck:
         self.check_revisions()
         self.check_real_time()
         self.check_writers()
+        self.check_ticks()
         self.check_freshness()
         self.check_sessions()
 
@@ -396,6 +396,16 @@ class EpochCheck:
                 if after.shown:
                     self.add("writers", f"batch {after.batch} of writer {writer} was applied (#{after.attempts[-1]}) without "
                              f"batch {missing}", *after.attempts)
+
+    def check_ticks(self):
+        """Compares ticks in the order of revisions. The tests of a cluster do not restart ticks."""
+        told = sorted((self.calls[number].revision, self.calls[number].tick, number) for number in self.reads + self.acks
+                      if self.calls[number].tick is not None and not (self.calls[number].duplicate and
+                                                                      self.calls[number].applied == 0))
+        for (revision, tick, before), (next_revision, next_tick, after) in zip(told, told[1:]):
+            if next_tick < tick or (revision == next_revision and next_tick != tick):
+                self.add("tick", f"revision {revision} has tick {tick} (#{before}), and revision {next_revision} has tick "
+                         f"{next_tick} (#{after})", before, after)
 
     def check_freshness(self):
         """Checks what reads must see because it was acknowledged before. `exactly` asks for the past, at any age."""

@@ -25,7 +25,7 @@ import time
 
 import keeper
 import sql
-from keeper import CUT, HUNG, OPEN, started_at
+from keeper import CUT, HUNG, OPEN, family, started_at
 
 PROGRAMS = "/usr/lib/postgresql/15/bin"
 USER, DATABASE = "locus", "locus"
@@ -93,20 +93,6 @@ def wait_for(condition, seconds, what):
         if time.monotonic() > until:
             raise EngineError(f"{what}: not within {seconds} s")
         time.sleep(POLL_SECONDS)
-
-
-def family(pid):
-    """Returns the ids of a process and of all its descendants."""
-    parents = {}
-    for name in os.listdir("/proc"):
-        if name.isdigit():
-            with contextlib.suppress(OSError, ValueError, IndexError):
-                with open(f"/proc/{name}/stat", encoding="utf-8", errors="replace") as file:
-                    parents.setdefault(int(file.read().rpartition(")")[2].split()[1]), []).append(int(name))
-    found = [pid]
-    for member in found:
-        found += parents.get(member, ())
-    return found
 
 
 class Node:

@@ -57,6 +57,7 @@ class Call:
     changes: dict = dataclasses.field(default_factory=dict)  # updates: object id -> position, None removes the object
     duplicate: bool = False     # updates: the ack said that the batch had been applied before
     applied: int | None = None  # updates: number of applied items in the ack
+    refused: int | None = None  # updates: number of refused items in the ack
     view: str = LATEST          # reads
     asked: int = 0              # reads: revision of the views AT_LEAST and EXACTLY
     leader_only: bool = False   # reads

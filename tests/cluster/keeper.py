@@ -42,9 +42,31 @@ def started_at(pid):
     return None if fields[0] == "Z" else int(fields[19])
 
 
+def family(pid):
+    """Returns the ids of a process and of all its descendants."""
+    parents = {}
+    for name in os.listdir("/proc"):
+        if name.isdigit():
+            with contextlib.suppress(OSError, ValueError, IndexError):
+                with open(f"/proc/{name}/stat", encoding="utf-8", errors="replace") as file:
+                    parents.setdefault(int(file.read().rpartition(")")[2].split()[1]), []).append(int(name))
+    found = [pid]
+    for member in found:
+        found += parents.get(member, ())
+    return found
+
+
 def end_in_order():
     """Lets SIGTERM end this process by an exception, so that it ends what it started itself."""
     signal.signal(signal.SIGTERM, lambda number, _frame: sys.exit(128 + number))
+
+
+def send(processes, number):
+    """Sends a signal to processes, a map from id to start, as far as they still live."""
+    for pid, start in processes.items():
+        with contextlib.suppress(ProcessLookupError):
+            if start is not None and started_at(pid) == start:
+                os.kill(pid, number)
 
 
 class Link:
@@ -151,15 +173,17 @@ class Service:
         self.end()
 
     def end(self):
-        """Ends guarded processes: quickly but in order first, so that PostgreSQL frees its shared memory, then by force."""
-        alive = {pid: start for pid, start in self.guarded.items() if start is not None and started_at(pid) == start}
-        for number in (signal.SIGCONT, signal.SIGQUIT, signal.SIGKILL):
-            for pid, start in alive.items():
-                if started_at(pid) == start:
-                    os.kill(pid, number)
-            until = time.monotonic() + (STOP_SECONDS if number == signal.SIGQUIT else 0)
-            while time.monotonic() < until and any(started_at(pid) == start for pid, start in alive.items()):
-                time.sleep(0.02)
+        """Ends guarded processes: quickly but in order first, so that PostgreSQL frees its shared memory, then by force, with
+        all processes that they started.
+        """
+        guarded = {pid: start for pid, start in self.guarded.items() if start is not None and started_at(pid) == start}
+        members = {pid: started_at(pid) for parent in guarded for pid in family(parent)}
+        send(members, signal.SIGCONT)
+        send(guarded, signal.SIGQUIT)
+        until = time.monotonic() + STOP_SECONDS
+        while time.monotonic() < until and any(started_at(pid) == start for pid, start in guarded.items()):
+            time.sleep(0.02)
+        send(members, signal.SIGKILL)
         for folder in self.folders:
             shutil.rmtree(folder, ignore_errors=True)
 

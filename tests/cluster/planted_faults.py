@@ -7,7 +7,7 @@ among the places where the fault would show, and returns whether there was one.
 import dataclasses
 
 from history import AT_LEAST, EXACTLY, FAILED, LATEST, OK, READ, UNKNOWN, UPDATE
-from simulator import EPOCH, MS
+from simulator import EPOCH, MS, tick_of
 
 FAULTS = {}  # name -> (rule, options of the simulation, function)
 
@@ -39,11 +39,12 @@ def shift(history, scene, first, distance):
         if call.scene == scene and call.outcome == OK:
             call.revision += distance if call.revision >= first else 0
             call.asked += distance if call.asked >= first else 0
+            call.tick = tick_of(call.revision)
 
 
 def answer_from(run, call, revision):
     """Answers a read from another revision, correctly."""
-    call.revision = revision
+    call.revision, call.tick = revision, tick_of(revision)
     call.answer = {item: scene_of(run, call).at(item, revision) for item in call.answer}
 
 
@@ -273,6 +274,21 @@ def follower_differs_from_the_leader(run, history):
     if place:
         place[0].answer[place[1]] = (-2.0, 0.0, 0.0)
     return bool(place)
+
+
+@fault("tick")
+def tick_goes_down(run, history):
+    call = choose(run, (call for call in acks(history) if call.tick > 1))
+    call.tick -= 2
+    return True
+
+
+@fault("tick")
+def daemons_name_two_ticks_of_one_revision(run, history):
+    made = {(call.scene, call.revision) for call in acks(history)}
+    call = choose(run, (call for call in reads(history) if (call.scene, call.revision) in made))
+    call.tick += 1
+    return True
 
 
 @fault("equal")

@@ -1,4 +1,10 @@
-"""Makes a failing history small: hides calls while the same rule stays broken, and prints those that are left."""
+"""Makes a failing history small: hides calls while the same rule stays broken, and prints those that are left.
+
+    python3 shrink.py FILE...    joins the histories in the files and judges them; exits 1 if a rule is broken
+"""
+import itertools
+import sys
+
 from checker import check
 from history import AT_LEAST, EXACTLY, NEVER, OK, READ, TOKEN, UPDATE, History
 
@@ -111,3 +117,15 @@ def report(history, violations, origin=""):
         told.add(violation.rule)
         lines += [str(violation), *describe(history, shrink(history, violation))]
     return "\n".join(lines)
+
+
+def main(paths):
+    files = [open(path, encoding="utf-8") for path in paths]
+    history = History.read(itertools.chain(*files))
+    violations = check(history)
+    print(report(history, violations))
+    return 1 if violations else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -17,6 +17,11 @@ EPOCH = 77
 RECENT = 50  # revisions that a daemon can still answer by `exactly`
 
 
+def tick_of(revision):
+    """Returns the tick of a revision: several batches of a tick follow one another."""
+    return revision // 3
+
+
 class Scene:
     """The log of a scene: what is committed, when, and by which leader."""
 
@@ -150,7 +155,7 @@ class Simulator:
 
     def acknowledge(self, now, client, scene, call, end):
         call.revision, call.applied, call.duplicate = self.apply(now, scene, call)
-        call.epoch, call.daemon, call.token = EPOCH, scene.leader, scene.token
+        call.epoch, call.daemon, call.token, call.tick = EPOCH, scene.leader, scene.token, tick_of(call.revision)
         call.outcome, call.end = OK, end
         key = (client, scene.name)
         self.seen[key] = max(self.seen.get(key, 0), call.revision)
@@ -179,7 +184,7 @@ class Simulator:
             call.asked = revision
         call.age_ms = math.ceil(age / MS) + self.random.choice((0, 0, 3)) if daemon != scene.leader else 0
         call.outcome, call.end, call.daemon, call.epoch, call.revision = OK, end, daemon, EPOCH, revision
-        call.token = scene.token if call.leader_only else None
+        call.token, call.tick = scene.token if call.leader_only else None, tick_of(revision)
         for item in self.random.sample(range(1, OBJECTS + 1), 6):
             call.answer[item] = scene.at(item, revision)
         key = (client, scene.name)
