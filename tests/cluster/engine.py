@@ -130,6 +130,9 @@ class Engine:
             self.prepare_user()
             self.nodes = [Node(f"n{number}", os.path.join(self.folder, "nodes")) for number in range(3)]
             self.primary = self.nodes[0]
+            for node in self.nodes:  # all at once, so that a fault reaches those that are used later, too
+                for other in self.nodes:
+                    self.link(node.name, other)
             self.start_all()
         except BaseException:
             self.close()
@@ -204,7 +207,9 @@ class Engine:
         return self.links[key]
 
     def set_links(self, state, sources=None, nodes=None):
-        """Sets the links of some sources to some nodes to OPEN, CUT or HUNG. None means all sources, or all nodes."""
+        """Sets the links of some sources to some nodes to OPEN, CUT or HUNG. None means all sources, or all nodes. Links of
+        clients that are made later are open.
+        """
         names = [f"{source}>{name}" for source, name in self.links
                  if (sources is None or source in sources) and (nodes is None or name in [node.name for node in nodes])]
         self.keeper.set(names, state)

@@ -21,7 +21,7 @@ sys.path.insert(0, HERE)
 import append_log  # noqa: E402
 from append_log import Writer, compare  # noqa: E402
 from checker import check  # noqa: E402
-from engine import HUNG, Engine, EngineError, unavailable  # noqa: E402
+from engine import CUT, HUNG, Engine, EngineError, unavailable  # noqa: E402
 from engine_faults import EngineFaults  # noqa: E402
 from fault_plan import ENGINE, Plan, names, run  # noqa: E402
 from history import Recorder  # noqa: E402
@@ -165,6 +165,17 @@ class EngineTest(unittest.TestCase):
             engine.wipe(old)
             engine.fail_over()
             self.assertEqual(engine.ask(engine.primary, "SELECT last FROM scene"), [(0,)])
+
+    def test_an_old_primary_without_standbys_takes_connections_and_never_commits(self):
+        with Engine(life_seconds=LIFE_SECONDS) as engine:
+            append_log.create_tables(engine, ["arena"])
+            old = engine.primary
+            engine.set_links(CUT, sources=["n1", "n2"], nodes=[old])
+            new = engine.fail_over()
+            append = (append_log.APPEND, ("arena", 0, 0, "1=a"))
+            with self.assertRaises(Unknown):
+                Session(engine.dsn(old, "client")).run(2, append)
+            self.assertEqual(Session(engine.dsn(new, "client")).run(10, append), [1])
 
     def test_without_standbys_nothing_is_committed_and_the_old_primary_is_copied_anew_after_it_was_wiped(self):
         with Engine(life_seconds=LIFE_SECONDS) as engine:

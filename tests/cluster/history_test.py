@@ -17,8 +17,8 @@ from planted_faults import FAULTS  # noqa: E402
 from shrink import report, shrink  # noqa: E402
 from simulator import Simulator, simulate  # noqa: E402
 
-SEEDS = 6  # histories of each planted fault
-CALLS = 1500
+SEEDS = 5  # histories of each planted fault
+CALLS = 1000
 MS = 1_000_000
 
 
