@@ -12,7 +12,8 @@ sys.dont_write_bytecode = True
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 
 from checker import RULES, Violation, check  # noqa: E402
-from history import (FAILED, OK, READ, TOKEN, UNKNOWN, UPDATE, Call, History, Recorder, outcome_of_update)  # noqa: E402
+from history import (EXACTLY, FAILED, OK, READ, TOKEN, UNKNOWN, UPDATE, Call, History, Recorder,  # noqa: E402
+                     outcome_of_update)
 from planted_faults import FAULTS  # noqa: E402
 from shrink import report, shrink  # noqa: E402
 from simulator import Simulator, simulate  # noqa: E402
@@ -131,6 +132,21 @@ class PlantedFaultTest(unittest.TestCase):
     def test_a_token_that_the_engine_named_may_not_go_back(self):
         calls = [Call(TOKEN, "s", "watch", 0, 1, OK, "engine", token=5), Call(TOKEN, "s", "watch", 2, 3, OK, "engine", token=4)]
         self.assertEqual(rules(History(calls)), {"token"})
+
+    def test_a_token_may_not_go_down_from_one_revision_to_the_next(self):
+        calls = [update(0, 5, 1, {1: (1.0,)}, token=2, daemon="d1"), update(1, 6, 2, {1: (2.0,)}, token=1, daemon="d0")]
+        self.assertEqual(rules(History(calls)), {"token"})
+
+    def test_a_read_may_not_show_an_unknown_update_at_a_revision_before_it_was_sent(self):
+        calls = [update(0, 1, 1, {1: (1.0,)}), update(2, 3, 2, {1: (2.0,)}), update(4, 9, 0, {2: (3.0,)}, UNKNOWN),
+                 read(5, 6, 1, {2: (3.0,)}, view=EXACTLY, asked=1)]
+        self.assertEqual(rules(History(calls)), {"committed"})
+
+    def test_a_read_may_not_show_an_update_before_its_revision(self):
+        calls = [update(0, 9, 1, {1: (1.0,)}), update(0, 9, 2, {1: (2.0,)}, writer=3, batch=1), read(1, 8, 1, {1: (2.0,)})]
+        self.assertEqual(rules(History(calls)), {"model"})
+        calls.append(update(0, 4, 0, {1: (2.0,)}, UNKNOWN, writer=3, batch=1))
+        self.assertEqual(rules(History(calls)), {"once"})
 
     def test_a_huge_revision_is_reported_without_listing_all_before_it(self):
         self.assertEqual(rules(History([update(0, 1, 1 << 60, {1: (1.0,)})])), {"dense"})
