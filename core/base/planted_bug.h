@@ -139,6 +139,14 @@ enum class PlantedBug {
   kJwtAnySignature,      // the signature is not compared
   kJwtKeyOfAnotherKind,  // a key verifies signatures of any algorithm
   kUserFromAfar,         // the Unix user of a peer is also accepted on connections that are not local
+  // The cluster, and the simulated engine that its tests use:
+  kSilenceWithoutBeats,  // silence of members is also counted while the own beats fail
+  kLeaseUnchecked,       // a lease counts as living although it has expired, as after a pause
+  kMarkAnyBeat,          // the engine marks a member as dead although it has beaten since
+  kTakeOverAnyToken,     // the engine lets a member take over a scene although its token has changed
+  kHandOverAnyToken,     // the engine lets a former leader hand a scene over
+  kHandedOverLeadsOn,    // the lease of a scene that is handed over is not stopped
+  kDeadLeadsOn,          // a member that was declared dead keeps its lease
   // The nearest kernels:
   kNearestError,      // bounds of distances to triangles are computed in float without an error bound
   kNearestPad,        // the distance between the point and the rounded point is ignored

@@ -30,6 +30,7 @@ ALLOWED = {
     "server": ["server/*", "core/*"],
     "server/config": ["core/base"],
     "server/scheduling": ["core/*", "server/config"],
+    "server/cluster": ["server/scheduling", "core/scene/log", "core/base"],
     "server/storage/rows": ["core/*"],
     "server/storage/rocksdb": ["server/storage/rows", "core/*"],
     "server/storage/postgres": ["server/storage/rows", "core/*"],
