@@ -36,39 +36,41 @@ class EngineLink : public server::ClusterEngine {
       : engine_(engine), judge_(std::move(judge)), postpone_(std::move(postpone)), done_(std::move(done)) {}
 
   absl::Status join(server::MemberId id, const server::MemberInfo& info, uint64_t load) override {
-    return call<absl::Status>(CallKind::kOtherWrite, [=, this] { return engine_.join(id, info, load); });
+    return call<absl::Status>(CallKind::kOtherWrite, [=, &engine = engine_] { return engine.join(id, info, load); });
   }
   absl::StatusOr<server::BeatReply> beat(server::MemberId id, uint64_t load, size_t watched) override {
-    return call<absl::StatusOr<server::BeatReply>>(CallKind::kBeat, [=, this] { return engine_.beat(id, load, watched); });
+    return call<absl::StatusOr<server::BeatReply>>(CallKind::kBeat,
+                                                   [=, &engine = engine_] { return engine.beat(id, load, watched); });
   }
   absl::StatusOr<bool> mark_dead(server::SeenBeat seen) override {
-    return call<absl::StatusOr<bool>>(CallKind::kOtherWrite, [=, this] { return engine_.mark_dead(seen); });
+    return call<absl::StatusOr<bool>>(CallKind::kOtherWrite, [=, &engine = engine_] { return engine.mark_dead(seen); });
   }
   absl::Status leave(server::MemberId id) override {
-    return call<absl::Status>(CallKind::kOtherWrite, [=, this] { return engine_.leave(id); });
+    return call<absl::Status>(CallKind::kOtherWrite, [=, &engine = engine_] { return engine.leave(id); });
   }
   absl::Status forget(server::MemberId id) override {
-    return call<absl::Status>(CallKind::kOtherWrite, [=, this] { return engine_.forget(id); });
+    return call<absl::Status>(CallKind::kOtherWrite, [=, &engine = engine_] { return engine.forget(id); });
   }
   absl::StatusOr<std::vector<server::MemberRow>> members() override {
-    return call<absl::StatusOr<std::vector<server::MemberRow>>>(CallKind::kRead, [this] { return engine_.members(); });
+    return call<absl::StatusOr<std::vector<server::MemberRow>>>(CallKind::kRead,
+                                                                [&engine = engine_] { return engine.members(); });
   }
   absl::StatusOr<std::vector<server::SceneRow>> scenes_led_by(server::MemberId leader) override {
     return call<absl::StatusOr<std::vector<server::SceneRow>>>(
-        CallKind::kRead, [=, this] { return engine_.scenes_led_by(leader); });
+        CallKind::kRead, [=, &engine = engine_] { return engine.scenes_led_by(leader); });
   }
   absl::StatusOr<std::vector<server::SceneRow>> scenes_without_leader() override {
-    return call<absl::StatusOr<std::vector<server::SceneRow>>>(CallKind::kRead,
-                                                               [this] { return engine_.scenes_without_leader(); });
+    return call<absl::StatusOr<std::vector<server::SceneRow>>>(
+        CallKind::kRead, [&engine = engine_] { return engine.scenes_without_leader(); });
   }
   absl::StatusOr<server::SceneRow> take_over(SceneKey scene, server::Token seen, server::MemberId to) override {
     return call<absl::StatusOr<server::SceneRow>>(CallKind::kOtherWrite,
-                                                  [=, this] { return engine_.take_over(scene, seen, to); });
+                                                  [=, &engine = engine_] { return engine.take_over(scene, seen, to); });
   }
   absl::StatusOr<server::SceneRow> hand_over(SceneKey scene, server::Token token, server::MemberId from,
                                              server::MemberId to) override {
-    return call<absl::StatusOr<server::SceneRow>>(CallKind::kOtherWrite,
-                                                  [=, this] { return engine_.hand_over(scene, token, from, to); });
+    return call<absl::StatusOr<server::SceneRow>>(
+        CallKind::kOtherWrite, [=, &engine = engine_] { return engine.hand_over(scene, token, from, to); });
   }
 
  private:

@@ -1,7 +1,7 @@
 // Record of which daemon believed to lead which scene, with which token, and from when to when its lease allowed to
-// claim that, in simulated time. fault() returns the first contradiction: two daemons that could claim the same scene at
-// one moment, a token that two daemons had, or a claim with a lower token after one with a higher token. One thread at a
-// time.
+// claim that, in simulated time. fault() returns the first contradiction: two daemons that could claim the same scene
+// at one moment, a token that two daemons had, or a claim with a lower token after one with a higher token. One thread
+// at a time.
 #ifndef LOCUS_TESTS_SUPPORT_LEADERSHIP_CLAIMS_H_
 #define LOCUS_TESTS_SUPPORT_LEADERSHIP_CLAIMS_H_
 
@@ -66,7 +66,7 @@ class LeadershipClaims {
     open_[daemon] = std::move(still);
   }
 
-  // Closes all claims and returns the first contradiction, or an empty string.
+  // Ends all claims and returns the first contradiction, or an empty string. Call it once, at the end.
   std::string fault() {
     for (auto& [daemon, claims] : open_) {
       for (Claim& claim : claims) close(std::move(claim));

@@ -1,6 +1,6 @@
-// Engine of a cluster in memory, for tests of server/cluster: obeys the contract of ClusterEngine, calls an auditor after
-// each change that matters, and counts calls. It never fails: EngineLink (engine_link.h) puts faults before it. With a
-// planted bug it breaks its contract, so that tests can prove that they would notice.
+// Engine of a cluster in memory, for tests of server/cluster: obeys the contract of ClusterEngine, calls an auditor
+// after each change that matters, and counts calls. It never fails: EngineLink (engine_link.h) puts faults before it.
+// With a planted bug it breaks its contract, so that tests can prove that they would notice.
 //
 // Threads: every member function may be called from any thread, but the setters before the first call. The auditor is
 // called under the lock.
@@ -185,8 +185,8 @@ class SimulatedEngine : public server::ClusterEngine {
   }
 
   SceneRow lead(SceneRow& row, Token token, MemberId to, LeaderChange::Cause cause) LOCUS_REQUIRES(mutex_) {
-    const LeaderChange change = {cause, row, {row.key, to, token, row.last_sequence, row.epoch},
-                                 living_.contains(row.leader)};
+    const LeaderChange change = {
+        cause, row, {row.key, to, token, row.last_sequence, row.epoch}, living_.contains(row.leader)};
     led_[row.leader].erase(row.key);
     led_[to].insert(row.key);
     row = change.after;
