@@ -152,7 +152,7 @@ class SimulatedEngine : public server::ClusterEngine {
     if (found->second.token != seen && !planted(PlantedBug::kTakeOverAnyToken))
       return absl::AbortedError("the token has changed");
     if (!living_.contains(to)) return absl::FailedPreconditionError("the member does not live");
-    return lead(found->second, seen + 1, to, LeaderChange::Cause::kTakeOver);
+    return lead(found->second, to, LeaderChange::Cause::kTakeOver);
   }
 
   absl::StatusOr<SceneRow> hand_over(SceneKey scene, Token token, MemberId from, MemberId to) override {
@@ -162,7 +162,7 @@ class SimulatedEngine : public server::ClusterEngine {
     const bool same = found->second.token == token && found->second.leader == from;
     if (!same && !planted(PlantedBug::kHandOverAnyToken)) return absl::AbortedError("the leader has changed");
     if (to != 0 && !living_.contains(to)) return absl::FailedPreconditionError("the member does not live");
-    return lead(found->second, token + 1, to, LeaderChange::Cause::kHandOver);
+    return lead(found->second, to, LeaderChange::Cause::kHandOver);
   }
 
  private:
@@ -184,9 +184,9 @@ class SimulatedEngine : public server::ClusterEngine {
     return rows;
   }
 
-  SceneRow lead(SceneRow& row, Token token, MemberId to, LeaderChange::Cause cause) LOCUS_REQUIRES(mutex_) {
+  SceneRow lead(SceneRow& row, MemberId to, LeaderChange::Cause cause) LOCUS_REQUIRES(mutex_) {
     const LeaderChange change = {
-        cause, row, {row.key, to, token, row.last_sequence, row.epoch}, living_.contains(row.leader)};
+        cause, row, {row.key, to, row.token + 1, row.last_sequence, row.epoch}, living_.contains(row.leader)};
     led_[row.leader].erase(row.key);
     led_[to].insert(row.key);
     row = change.after;

@@ -1,0 +1,62 @@
+#include "server/cluster/led_scenes.h"
+
+#include <gmock/gmock.h>
+
+#include <memory>
+
+namespace locus::server {
+namespace {
+
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+using ::testing::UnorderedElementsAre;
+
+SceneRow led_row(SceneKey key, Token token) { return {key, 1, token, 0, 1}; }
+
+class LedScenesTest : public ::testing::Test {
+ protected:
+  std::shared_ptr<MemberLease> member_ = std::make_shared<MemberLease>([] { return ClusterTime(); });
+  LedScenes led_;
+};
+
+TEST_F(LedScenesTest, AStoppedSceneIsRemovedAndItsLeaseStopsAtOnce) {
+  const auto lease = led_.start(led_row(5, 3), member_);
+  EXPECT_EQ(led_.find(5), lease);
+  EXPECT_FALSE(led_.stop(5, 2, StopReason::kFenced)) << "another token";
+  EXPECT_TRUE(led_.stop(5, 3, StopReason::kFenced));
+  EXPECT_EQ(lease->state(), SceneLease::State::kStopped);
+  EXPECT_EQ(led_.find(5), nullptr);
+  const auto stopped = led_.take_stopped();
+  ASSERT_THAT(stopped, SizeIs(1));
+  EXPECT_EQ(stopped[0].token, 3u);
+  EXPECT_THAT(led_.take_stopped(), IsEmpty());
+}
+
+TEST_F(LedScenesTest, OnlyAHigherTokenReplacesALease) {
+  const auto lease = led_.start(led_row(5, 3), member_);
+  EXPECT_EQ(led_.start(led_row(5, 3), member_), nullptr);
+  EXPECT_EQ(led_.start(led_row(5, 2), member_), nullptr);
+  EXPECT_NE(led_.start(led_row(5, 4), member_), nullptr);
+  EXPECT_EQ(lease->state(), SceneLease::State::kStopped);
+  EXPECT_THAT(led_.take_stopped(), SizeIs(1));
+}
+
+TEST_F(LedScenesTest, ATakenSceneHasNoStopForTheHost) {
+  const auto lease = led_.start(led_row(5, 3), member_);
+  EXPECT_EQ(led_.take(5), 3u);
+  EXPECT_EQ(led_.take(5), std::nullopt);
+  EXPECT_EQ(lease->state(), SceneLease::State::kStopped);
+  EXPECT_THAT(led_.take_stopped(), IsEmpty());
+}
+
+TEST_F(LedScenesTest, AllScenesStopTogether) {
+  led_.start(led_row(5, 3), member_);
+  led_.start(led_row(6, 1), member_);
+  EXPECT_THAT(led_.keys(), UnorderedElementsAre(5, 6));
+  led_.stop_all(StopReason::kDeclaredDead);
+  EXPECT_EQ(led_.size(), 0u);
+  EXPECT_THAT(led_.take_stopped(), SizeIs(2));
+}
+
+}  // namespace
+}  // namespace locus::server
