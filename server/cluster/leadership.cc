@@ -23,7 +23,7 @@ ClusterTime Leadership::step() {
     refuse_moves();
     return (hand_over_ && hand_over()) || end_drain() ? options_.clock() : soon;
   }
-  if (mark_suspect() || reconcile() || hand_over() || end_drain() || take_followed() || give_estate() || sweep())
+  if (mark_suspect() || hand_over() || reconcile() || end_drain() || take_followed() || give_estate() || sweep())
     return options_.clock();
   return std::max(now, std::min(soon, membership_.next_occasion()));
 }

@@ -95,8 +95,8 @@ class Leadership {
 
   // Steps. Each returns true if it has made a call of the engine, or if there may be more to do.
   bool mark_suspect() LOCUS_EXCLUDES(mutex_);
-  bool reconcile() LOCUS_EXCLUDES(mutex_);
   bool hand_over() LOCUS_EXCLUDES(mutex_);
+  bool reconcile() LOCUS_EXCLUDES(mutex_);
   bool end_drain() LOCUS_EXCLUDES(mutex_);
   bool take_followed() LOCUS_EXCLUDES(mutex_);
   bool give_estate() LOCUS_EXCLUDES(mutex_);

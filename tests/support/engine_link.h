@@ -1,6 +1,6 @@
 // Connection of one simulated daemon to the engine, on which calls take simulated time and fail: they time out, are not
 // answered although the engine has executed them, or are executed long after the caller has given up. The owner decides
-// the outcome of each call. One thread at a time.
+// the outcome of each call. As many threads as the functions of the owner allow.
 #ifndef LOCUS_TESTS_SUPPORT_ENGINE_LINK_H_
 #define LOCUS_TESTS_SUPPORT_ENGINE_LINK_H_
 
