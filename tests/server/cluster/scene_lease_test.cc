@@ -24,7 +24,7 @@ TEST_F(SceneLeaseTest, ALeaseLivesUntilTheEndOfItsExtension) {
   EXPECT_EQ(scene_.state(), SceneLease::State::kExpired);
 }
 
-// As after SIGSTOP: nothing ran while the time passed.
+// Nothing runs while the time passes, as after SIGSTOP.
 TEST_F(SceneLeaseTest, APausedProcessFindsItsLeaseExpiredUntilABeatSucceeds) {
   member_->extend(now_ + seconds(5));
   now_ += seconds(20);
