@@ -24,7 +24,7 @@ TEST_F(SceneLeaseTest, ALeaseLivesUntilTheEndOfItsExtension) {
   EXPECT_EQ(scene_.state(), SceneLease::State::kExpired);
 }
 
-// Nothing runs while the time passes, as after SIGSTOP.
+// Simulates SIGSTOP: the time passes and nothing runs.
 TEST_F(SceneLeaseTest, APausedProcessFindsItsLeaseExpiredUntilABeatSucceeds) {
   member_->extend(now_ + seconds(5));
   now_ += seconds(20);
