@@ -142,6 +142,7 @@ enum class PlantedBug {
   // The cluster, and the simulated engine that its tests use:
   kSilenceWithoutBeats,  // silence of members is also counted while the own beats fail
   kLeaseUnchecked,       // a lease counts as living although it has expired, as after a pause
+  kLeaseFromAnswer,      // the lease is counted from the answer to a beat, not from before it was sent
   kMarkAnyBeat,          // the engine marks a member as dead although it has beaten since
   kTakeOverAnyToken,     // the engine lets a member take over a scene although its token has changed
   kHandOverAnyToken,     // the engine lets a former leader hand a scene over

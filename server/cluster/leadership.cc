@@ -6,6 +6,7 @@
 
 #include "absl/container/flat_hash_set.h"
 #include "absl/status/status.h"
+#include "core/base/check.h"
 #include "core/base/status_macros.h"
 
 namespace locus::server {
@@ -64,6 +65,7 @@ bool Leadership::reconcile() {
     due |= std::exchange(reconcile_soon_, false);
   }
   if (!due) return false;
+  LOCUS_CHECK(!hand_over_);  // else the scene that is handed over would be led again
   const absl::StatusOr<std::vector<SceneRow>> rows = engine_.scenes_led_by(self_.id);
   if (!rows.ok()) {
     reconcile_at_ = ClusterTime::min();
@@ -74,7 +76,7 @@ bool Leadership::reconcile() {
   absl::flat_hash_set<SceneKey> present;
   for (const SceneRow& row : *rows) {
     present.insert(row.key);
-    if (!hand_over_ || hand_over_->move.scene != row.key) begin(row);
+    begin(row);
   }
   for (const SceneKey scene : led_.keys()) {
     const std::shared_ptr<const SceneLease> lease = led_.find(scene);

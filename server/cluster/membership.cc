@@ -98,7 +98,7 @@ ClusterTime Membership::beat(MemberId id, uint64_t load) {
 
 bool Membership::store(const BeatReply& reply, ClusterTime sent, ClusterTime received) {
   const bool first = !lease_->living();
-  lease_->extend(sent + options_.timing.lease);
+  lease_->extend((planted(PlantedBug::kLeaseFromAnswer) ? received : sent) + options_.timing.lease);
   silence_.beat_succeeded(received, reply.next);
   ring_.update(reply, sent, received);
   const bool assigned = std::exchange(assigned_, reply.assigned) != reply.assigned;

@@ -7,6 +7,7 @@ namespace {
 constexpr Mutant kMutants[] = {
     {"SilenceCountedWhileTheEngineIsAway", PlantedBug::kSilenceWithoutBeats},
     {"LeaseNotCheckedAfterAPause", PlantedBug::kLeaseUnchecked},
+    {"LeaseCountedFromTheAnswer", PlantedBug::kLeaseFromAnswer},
     {"MemberMarkedDeadAlthoughItHasBeaten", PlantedBug::kMarkAnyBeat},
     {"TokenNotCheckedInTakeOver", PlantedBug::kTakeOverAnyToken},
     {"TokenNotCheckedInHandOver", PlantedBug::kHandOverAnyToken},
