@@ -15,7 +15,6 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 using test::CallFate;
 using test::EngineLink;
-using ::testing::IsEmpty;
 
 // One membership whose beats the test makes, and other members that beat only if the test says so.
 class MembershipTest : public ::testing::Test {
