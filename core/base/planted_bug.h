@@ -148,6 +148,13 @@ enum class PlantedBug {
   kHandOverAnyToken,     // the engine lets a former leader hand a scene over
   kHandedOverLeadsOn,    // the lease of a scene that is handed over is not stopped
   kDeadLeadsOn,          // a member that was declared dead keeps its lease
+  // The log in PostgreSQL:
+  kAppendWithoutToken,   // an append does not name the token of its scene
+  kResolvedByPlainRead,  // whether an append was written is asked by a read that does not wait for the standbys
+  kEngineHostKept,       // after a lost connection the same host is tried first
+  kChainNotCompared,     // the running checksums of records are not compared
+  kWarningIgnored,       // a commit whose wait for the standbys was cancelled counts as acknowledged
+  kLostAppendKept,       // the records of a failed append are not removed before the next append
   // The nearest kernels:
   kNearestError,      // bounds of distances to triangles are computed in float without an error bound
   kNearestPad,        // the distance between the point and the rounded point is ignored

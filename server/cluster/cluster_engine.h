@@ -57,7 +57,7 @@ struct BeatReply {
   std::vector<MemberId> dead;  // dead members that were not forgotten, at most kMaxListed
 };
 
-struct SceneRow {
+struct LeaderRow {
   SceneKey key = 0;
   MemberId leader = 0;
   Token token = 0;
@@ -89,17 +89,17 @@ class ClusterEngine {
   virtual absl::StatusOr<std::vector<MemberRow>> members() = 0;
 
   // Returns the scenes whose leader is `leader`.
-  virtual absl::StatusOr<std::vector<SceneRow>> scenes_led_by(MemberId leader) = 0;
+  virtual absl::StatusOr<std::vector<LeaderRow>> scenes_led_by(MemberId leader) = 0;
   // Returns scenes whose leader is 0 or an unknown id, at most kMaxListed of them.
-  virtual absl::StatusOr<std::vector<SceneRow>> scenes_without_leader() = 0;
+  virtual absl::StatusOr<std::vector<LeaderRow>> scenes_without_leader() = 0;
   // Makes `to` the leader of a scene and its token `seen` + 1, if its token is `seen` and `to` is living. Precondition:
   // the caller knows that at token `seen` the scene had no leader, or one that is dead. Returns ABORTED if the token is
   // not `seen`, else FAILED_PRECONDITION if `to` is not living. Returns NOT_FOUND if the scene does not exist.
-  virtual absl::StatusOr<SceneRow> take_over(SceneKey scene, Token seen, MemberId to) = 0;
+  virtual absl::StatusOr<LeaderRow> take_over(SceneKey scene, Token seen, MemberId to) = 0;
   // Makes `to`, or no member if `to` is 0, the leader of a scene and its token `token` + 1, if its token is `token` and
   // its leader is `from`, and `to` is living. Returns ABORTED if token or leader differ, and the other errors of
   // take_over().
-  virtual absl::StatusOr<SceneRow> hand_over(SceneKey scene, Token token, MemberId from, MemberId to) = 0;
+  virtual absl::StatusOr<LeaderRow> hand_over(SceneKey scene, Token token, MemberId from, MemberId to) = 0;
 };
 
 }  // namespace locus::server

@@ -28,7 +28,7 @@ enum class StopReason : uint8_t {
 class ClusterHost {
  public:
   struct LedScene {
-    SceneRow row;  // the leader is this member; append with the row's token after its last sequence number
+    LeaderRow row;  // the leader is this member; append with the row's token after its last sequence number
     std::shared_ptr<const SceneLease> lease;
   };
   struct FollowedScene {
@@ -50,7 +50,7 @@ class ClusterHost {
   virtual void stop_leading(SceneKey scene, Token token, StopReason reason) = 0;
   // Notifies that this member made another one, or none if `row.leader` is 0, the leader: the daemon may tell it, or
   // its followers, before they notice by themselves within a second.
-  virtual void leader_changed(const SceneRow& row) = 0;
+  virtual void leader_changed(const LeaderRow& row) = 0;
 
   // Returns the scenes of this leader that this daemon follows and is able to lead.
   virtual std::vector<FollowedScene> followed_scenes(MemberId leader) = 0;

@@ -46,7 +46,7 @@ class ClusterMember {
   void stop();
 
   // Chooses the leader of a new scene, waiting for the engine: see Leadership::place().
-  absl::StatusOr<SceneRow> place(SceneKey scene) { return leadership_.place(scene); }
+  absl::StatusOr<LeaderRow> place(SceneKey scene) { return leadership_.place(scene); }
   // Stops leading a scene whose append was fenced, or that was deleted: see Leadership::fenced().
   bool fenced(SceneKey scene, Token token) { return leadership_.fenced(scene, token); }
   // Hands a scene over to a follower that has all of its records, and waits for the result: see Leadership::move().

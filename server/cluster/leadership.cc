@@ -47,7 +47,7 @@ void Leadership::deliver_stops() {
     host_.stop_leading(stopped.scene, stopped.token, stopped.reason);
 }
 
-void Leadership::begin(const SceneRow& row) {
+void Leadership::begin(const LeaderRow& row) {
   std::shared_ptr<const SceneLease> lease = led_.start(row, self_.lease);
   deliver_stops();
   if (lease != nullptr) host_.start_leading({row, std::move(lease)});
@@ -66,7 +66,7 @@ bool Leadership::reconcile() {
   }
   if (!due) return false;
   LOCUS_CHECK(!hand_over_);  // else the scene that is handed over would be led again
-  const absl::StatusOr<std::vector<SceneRow>> rows = engine_.scenes_led_by(self_.id);
+  const absl::StatusOr<std::vector<LeaderRow>> rows = engine_.scenes_led_by(self_.id);
   if (!rows.ok()) {
     reconcile_at_ = ClusterTime::min();
     return postpone();
@@ -74,7 +74,7 @@ bool Leadership::reconcile() {
   known_assigned_ = std::max(known_assigned_, self_.assigned);
   reconcile_at_ = options_.clock() + options_.timing.reconcile;
   absl::flat_hash_set<SceneKey> present;
-  for (const SceneRow& row : *rows) {
+  for (const LeaderRow& row : *rows) {
     present.insert(row.key);
     begin(row);
   }
@@ -86,7 +86,7 @@ bool Leadership::reconcile() {
   return true;
 }
 
-absl::StatusOr<SceneRow> Leadership::place(SceneKey scene) {
+absl::StatusOr<LeaderRow> Leadership::place(SceneKey scene) {
   constexpr int kAttempts = 4;  // each after the first because the chosen member had just died
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
     if (!table_is_fresh()) RETURN_IF_ERROR(read_table());
@@ -97,7 +97,7 @@ absl::StatusOr<SceneRow> Leadership::place(SceneKey scene) {
       if (!to) table_.expire();
     }
     if (!to) return absl::UnavailableError("no member of the cluster takes scenes");
-    absl::StatusOr<SceneRow> row = engine_.take_over(scene, 0, *to);
+    absl::StatusOr<LeaderRow> row = engine_.take_over(scene, 0, *to);
     if (row.status().code() == absl::StatusCode::kFailedPrecondition) {
       const MutexLock lock(mutex_);
       table_.remove(*to);

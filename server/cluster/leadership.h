@@ -53,7 +53,7 @@ class Leadership {
   // Chooses the leader of a new scene and stores it. Returns the scene's row. Returns ABORTED if the scene has a leader
   // already, NOT_FOUND if it does not exist, UNAVAILABLE if the outcome is unknown or no member takes scenes; the
   // scene is then placed later, within some seconds after the engine or a member is back.
-  absl::StatusOr<SceneRow> place(SceneKey scene) LOCUS_EXCLUDES(mutex_);
+  absl::StatusOr<LeaderRow> place(SceneKey scene) LOCUS_EXCLUDES(mutex_);
   // Records that an append with `token` was refused because of the fence, or that the scene was deleted: its lease
   // stops at once. Returns false if the scene was not led with this token any more.
   bool fenced(SceneKey scene, Token token);
@@ -90,7 +90,7 @@ class Leadership {
   struct Estate {
     MemberId dead = 0;  // 0: without a leader
     bool listed = false;
-    std::deque<SceneRow> scenes;
+    std::deque<LeaderRow> scenes;
   };
 
   // Steps. Each returns true if it has made a call of the engine, or if there may be more to do.
@@ -107,7 +107,7 @@ class Leadership {
   // Notifies the host of stops.
   void deliver_stops();
   // Begins to lead the scene unless it is led with this token.
-  void begin(const SceneRow& row);
+  void begin(const LeaderRow& row);
   // Postpones the next call of the engine after an error. Returns true.
   bool postpone();
   bool draining() const LOCUS_EXCLUDES(mutex_);

@@ -108,7 +108,7 @@ bool Leadership::hand_over() {
     if (!hand_over_) return true;
   }
   const HandOver current = *hand_over_;
-  const absl::StatusOr<SceneRow> row = engine_.hand_over(current.move.scene, current.token, current.from, current.to);
+  const absl::StatusOr<LeaderRow> row = engine_.hand_over(current.move.scene, current.token, current.from, current.to);
   switch (row.status().code()) {
     case absl::StatusCode::kOk:
       host_.leader_changed(*row);

@@ -37,7 +37,7 @@ bool Leadership::take_followed() {
   if (draining()) followed_.clear();
   if (followed_.empty()) return false;
   const ClusterHost::FollowedScene scene = followed_.front();
-  const absl::StatusOr<SceneRow> row = engine_.take_over(scene.key, scene.token, self_.id);
+  const absl::StatusOr<LeaderRow> row = engine_.take_over(scene.key, scene.token, self_.id);
   if (unanswered(row.status())) return postpone();
   followed_.pop_front();
   if (row.ok()) {
@@ -54,7 +54,7 @@ bool Leadership::give_estate() {
     estate_ = Estate{*dead, false, {}};
   }
   if (!estate_->listed) {
-    absl::StatusOr<std::vector<SceneRow>> scenes = engine_.scenes_led_by(estate_->dead);
+    absl::StatusOr<std::vector<LeaderRow>> scenes = engine_.scenes_led_by(estate_->dead);
     if (!scenes.ok()) return postpone();
     estate_->scenes.assign(scenes->begin(), scenes->end());
     estate_->listed = true;
@@ -91,8 +91,8 @@ void Leadership::give_first() {
     postpone();
     return;
   }
-  const SceneRow scene = estate_->scenes.front();
-  const absl::StatusOr<SceneRow> row = engine_.take_over(scene.key, scene.token, *to);
+  const LeaderRow scene = estate_->scenes.front();
+  const absl::StatusOr<LeaderRow> row = engine_.take_over(scene.key, scene.token, *to);
   if (unanswered(row.status())) {
     postpone();
     return;
@@ -115,7 +115,7 @@ void Leadership::give_first() {
 bool Leadership::sweep() {
   const ClusterTime now = options_.clock();
   if (estate_ || now < sweep_at_ || !membership_.sweeps()) return false;
-  const absl::StatusOr<std::vector<SceneRow>> scenes = engine_.scenes_without_leader();
+  const absl::StatusOr<std::vector<LeaderRow>> scenes = engine_.scenes_without_leader();
   if (!scenes.ok()) return postpone();
   sweep_at_ = now + options_.timing.sweep;
   if (scenes->empty()) return true;

@@ -6,7 +6,7 @@
 
 namespace locus::server {
 
-std::shared_ptr<const SceneLease> LedScenes::start(const SceneRow& row, std::shared_ptr<const MemberLease> member) {
+std::shared_ptr<const SceneLease> LedScenes::start(const LeaderRow& row, std::shared_ptr<const MemberLease> member) {
   const MutexLock lock(mutex_);
   std::shared_ptr<SceneLease>& lease = scenes_[row.key];
   if (lease != nullptr) {

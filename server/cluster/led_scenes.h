@@ -25,7 +25,7 @@ class LedScenes {
 
   // Adds a scene. Returns its lease, or null if the scene is in the table with this or a higher token. A lower token is
   // stopped as fenced.
-  std::shared_ptr<const SceneLease> start(const SceneRow& row, std::shared_ptr<const MemberLease> member)
+  std::shared_ptr<const SceneLease> start(const LeaderRow& row, std::shared_ptr<const MemberLease> member)
       LOCUS_EXCLUDES(mutex_);
   // Stops the lease of a scene at once and removes the scene. Returns false, and does nothing, if its token is not
   // `token`.

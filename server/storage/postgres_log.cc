@@ -5,7 +5,9 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_replace.h"
 #include "core/base/check.h"
+#include "core/base/planted_bug.h"
 #include "core/base/refusal.h"
 #include "core/base/status_macros.h"
 #include "server/storage/rows/refusals.h"
@@ -19,7 +21,7 @@ constexpr auto kBackoff = std::chrono::milliseconds(50);  // pause between two a
 constexpr uint64_t kMaxAppendBytes = uint64_t{256} << 20;
 
 constexpr const char* kAppendName = "append";
-Parameters append_parameters(const Append& append) {
+SqlParameters append_parameters(const Append& append) {
   std::vector<uint64_t> writers, batches;
   std::vector<absl::string_view> bytes;
   for (const LogEntry& entry : append.entries) {
@@ -27,7 +29,7 @@ Parameters append_parameters(const Append& append) {
     batches.push_back(entry.batch);
     bytes.push_back(entry.bytes);
   }
-  Parameters parameters;
+  SqlParameters parameters;
   parameters.number(append.scene).number(append.token).number(append.before);
   parameters.number(append.before + append.entries.size()).number(append.chains.back());
   parameters.number(append.entries.front().epoch).numbers(writers).numbers(batches).numbers(append.chains);
@@ -40,7 +42,7 @@ Parameters append_parameters(const Append& append) {
 absl::StatusOr<std::unique_ptr<PostgresLog>> PostgresLog::open(const PostgresOptions& options) {
   ASSIGN_OR_RETURN(EngineAddress address, EngineAddress::parse(options.url));
   PostgresOptions named = options;
-  if (named.member.empty()) named.member = absl::StrCat(absl::Hex(random_id(), absl::kZeroPad16));
+  if (named.member == 0) named.member = random_id() >> 1 | 1;  // a positive bigint
   std::unique_ptr<PostgresLog> log(new PostgresLog(named, std::move(address)));
   RETURN_IF_ERROR(log->list_stored());
   return log;
@@ -49,12 +51,17 @@ absl::StatusOr<std::unique_ptr<PostgresLog>> PostgresLog::open(const PostgresOpt
 PostgresLog::PostgresLog(const PostgresOptions& options, EngineAddress address)
     : options_(options),
       pool_(std::move(address), options.connect_wait,
-            [replication = options.replication](Connection& connection, Deadline deadline) -> absl::Status {
+            [replication = options.replication](EngineConnection& connection, Deadline deadline) -> absl::Status {
               RETURN_IF_ERROR(check_engine(connection, replication, deadline));
               RETURN_IF_ERROR(prepare_tables(connection, deadline));
+              if (planted(PlantedBug::kAppendWithoutToken))
+                return connection.prepare(
+                    kAppendName,
+                    absl::StrReplaceAll(kAppendStatement, {{"token = $2::bigint", "$2::bigint IS NOT NULL"}}).c_str(),
+                    deadline);
               return connection.prepare(kAppendName, kAppendStatement, deadline);
             }),
-      queue_(ConnectionPool::kConnections, [this](absl::Span<Append* const> group) { commit_group(group); }) {}
+      queue_(EnginePool::kConnections, [this](absl::Span<Append* const> group) { commit_group(group); }) {}
 
 absl::StatusOr<PostgresLog::LedPtr> PostgresLog::led(SceneKey scene) const {
   MutexLock lock(mutex_);
@@ -63,18 +70,18 @@ absl::StatusOr<PostgresLog::LedPtr> PostgresLog::led(SceneKey scene) const {
   return found->second;
 }
 
-absl::StatusOr<ConnectionPool::Lease> PostgresLog::acquire(ConnectionPool::Use use, Deadline deadline) const {
+absl::StatusOr<EnginePool::Lease> PostgresLog::acquire(EnginePool::Use use, Deadline deadline) const {
   while (true) {
-    absl::StatusOr<ConnectionPool::Lease> lease = pool_.acquire(use, deadline);
+    absl::StatusOr<EnginePool::Lease> lease = pool_.acquire(use, deadline);
     if (!absl::IsUnavailable(lease.status()) || std::chrono::steady_clock::now() + kBackoff >= deadline) return lease;
     std::this_thread::sleep_for(kBackoff);
   }
 }
 
-absl::StatusOr<ConnectionPool::Lease> PostgresLog::begin_read() const {
+absl::StatusOr<EnginePool::Lease> PostgresLog::begin_read() const {
   const Deadline deadline = change_deadline();
   while (true) {
-    ASSIGN_OR_RETURN(ConnectionPool::Lease lease, acquire(ConnectionPool::Use::kOther, deadline));
+    ASSIGN_OR_RETURN(EnginePool::Lease lease, acquire(EnginePool::Use::kOther, deadline));
     add_barrier(*lease);
     absl::Status status = lease->run(std::min(deadline, answer_deadline()));
     if (status.ok()) status = lease->run("BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY", answer_deadline());
@@ -108,7 +115,8 @@ absl::StatusOr<uint64_t> PostgresLog::append(SceneKey key, absl::Span<const LogE
   if (!scene.damage.ok()) return scene.damage;
   if (scene.fenced) return refuse_fenced(scene.name);
   if (scene.epoch != entries.front().epoch) return refuse_epoch(scene.name, scene.epoch, entries.front().epoch);
-  if (scene.possibly_last != 0) RETURN_IF_ERROR(remove_possibly_written(scene));
+  if (scene.possibly_last != 0 && !planted(PlantedBug::kLostAppendKept))
+    RETURN_IF_ERROR(remove_possibly_written(scene));
   Append append;
   append.scene = key;
   append.token = scene.token;
@@ -167,7 +175,7 @@ void PostgresLog::commit_group(absl::Span<Append* const> group) const {
 absl::Status PostgresLog::send_appends(absl::Span<Append* const> appends, Deadline deadline) const {
   std::vector<Append*> open;  // appends whose outcome must be found out
   {
-    ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, acquire(ConnectionPool::Use::kAppend, deadline));
+    ASSIGN_OR_RETURN(const EnginePool::Lease lease, acquire(EnginePool::Use::kAppend, deadline));
     for (const Append* const append : appends) lease->add_prepared(kAppendName, append_parameters(*append));
     // An operator may switch synchronous replication off at any time, which the engine does not report.
     const bool check = lease->due_for_check();
@@ -199,20 +207,22 @@ absl::Status PostgresLog::resolve(absl::Span<Append* const> appends, Deadline de
   std::vector<uint64_t> keys;
   for (const Append* const append : appends) keys.push_back(append->scene);
   while (true) {
-    ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, acquire(ConnectionPool::Use::kAppend, deadline));
+    ASSIGN_OR_RETURN(const EnginePool::Lease lease, acquire(EnginePool::Use::kAppend, deadline));
     // The lock waits for a transaction of the lost connection that still waits for the standbys, and the commit of this
     // transaction waits for them too. A plain read would show what no standby has.
-    lease->add(
-        "SELECT scene, token, last, chain FROM locus.scene_log WHERE scene = ANY($1::bigint[]) ORDER BY scene FOR "
-        "UPDATE",
-        Parameters().numbers(keys));
-    add_barrier(*lease);
+    const bool plain = planted(PlantedBug::kResolvedByPlainRead);
+    lease->add(absl::StrCat("SELECT scene, token, last, chain FROM locus.scene_log WHERE scene = ANY($1::bigint[])"
+                            " ORDER BY scene",
+                            plain ? "" : " FOR UPDATE")
+                   .c_str(),
+               SqlParameters().numbers(keys));
+    if (!plain) add_barrier(*lease);
     if (absl::Status status = lease->run(std::min(deadline, answer_deadline())); !status.ok()) {
       if (std::chrono::steady_clock::now() + kBackoff >= deadline) return status;
       std::this_thread::sleep_for(kBackoff);
       continue;
     }
-    const Rows& found = lease->results()[0];
+    const EngineRows& found = lease->results()[0];
     std::map<SceneKey, size_t> row_of;
     for (size_t row = 0; row < found.size(); ++row) row_of[found.number(row, 0)] = row;
     for (Append* const append : appends) {
@@ -239,23 +249,23 @@ absl::Status PostgresLog::resolve(absl::Span<Append* const> appends, Deadline de
 absl::Status PostgresLog::remove_possibly_written(Led& led) {
   const uint64_t key = led.key, token = led.token, last = led.last, chain = led.chain, possible = led.possibly_last;
   // The new token refuses statements of the failed append that arrive only now.
-  const auto remove = [&](Connection& connection) -> absl::Status {
+  const auto remove = [&](EngineConnection& connection) -> absl::Status {
     connection.add(
         "UPDATE locus.scene_log SET token = token + 1, last = $3::bigint, chain = $4::bigint"
         " WHERE scene = $1::bigint AND token = $2::bigint AND last IN ($3::bigint, $5::bigint)",
-        Parameters().number(key).number(token).number(last).number(chain).number(possible));
+        SqlParameters().number(key).number(token).number(last).number(chain).number(possible));
     connection.add("DELETE FROM locus.record WHERE scene = $1::bigint AND sequence > $2::bigint",
-                   Parameters().number(key).number(last));
+                   SqlParameters().number(key).number(last));
     RETURN_IF_ERROR(connection.run(answer_deadline()));
     return connection.results()[0].changed() == 1 ? absl::OkStatus() : refuse_fenced(led.name);
   };
-  const absl::Status status = transact(remove, [&](Connection& connection) -> absl::StatusOr<bool> {
+  const absl::Status status = transact(remove, [&](EngineConnection& connection) -> absl::StatusOr<bool> {
     connection.add("SELECT leader, token FROM locus.scene_log WHERE scene = $1::bigint FOR UPDATE",
-                   Parameters().number(key));
+                   SqlParameters().number(key));
     add_barrier(connection);
     RETURN_IF_ERROR(connection.run(answer_deadline()));
-    const Rows& found = connection.results()[0];
-    return !found.empty() && found.bytes(0, 0) == options_.member && found.number(0, 1) == token + 1;
+    const EngineRows& found = connection.results()[0];
+    return !found.empty() && found.number(0, 0) == options_.member && found.number(0, 1) == token + 1;
   });
   if (absl::IsAborted(status)) led.fenced = true;
   RETURN_IF_ERROR(status);
@@ -271,14 +281,14 @@ absl::StatusOr<uint64_t> PostgresLog::latest(SceneKey scene) const {
 
 absl::Status PostgresLog::read(SceneKey key, uint64_t from, RecordSink sink) const {
   // One transaction for both statements: a snapshot of the scene that is written meanwhile deletes records.
-  ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, begin_read());
-  Connection& connection = *lease;
+  ASSIGN_OR_RETURN(const EnginePool::Lease lease, begin_read());
+  EngineConnection& connection = *lease;
   connection.add("SELECT " LOCUS_SCENE_COLUMNS
                  ", l.last, l.chain, r.chain FROM locus.scene s JOIN locus.scene_log l ON l.scene = s.key"
                  " LEFT JOIN locus.record r ON r.scene = s.key AND r.sequence = $2::bigint WHERE s.key = $1::bigint",
-                 Parameters().number(key).number(from - 1));
+                 SqlParameters().number(key).number(from - 1));
   RETURN_IF_ERROR(connection.run(answer_deadline()));
-  const Rows& found = connection.results()[0];
+  const EngineRows& found = connection.results()[0];
   if (found.empty()) return scene_not_stored(key);
   ASSIGN_OR_RETURN(const StoredSceneRow row, scene_row(found, 0));
   const uint64_t last = found.number(0, kSceneColumns);
@@ -295,8 +305,8 @@ absl::Status PostgresLog::read(SceneKey key, uint64_t from, RecordSink sink) con
   RETURN_IF_ERROR(
       connection.stream("SELECT sequence, epoch, writer, batch, chain, bytes FROM locus.record"
                         " WHERE scene = $1::bigint AND sequence BETWEEN $2::bigint AND $3::bigint ORDER BY sequence",
-                        Parameters().number(key).number(from).number(last), options_.append_wait,
-                        [&](const Rows& found_record) -> absl::Status {
+                        SqlParameters().number(key).number(from).number(last), options_.append_wait,
+                        [&](const EngineRows& found_record) -> absl::Status {
                           LogRecord record;
                           record.sequence = found_record.number(0, 0);
                           record.entry.epoch = found_record.number(0, 1);
@@ -307,12 +317,12 @@ absl::Status PostgresLog::read(SceneKey key, uint64_t from, RecordSink sink) con
                             return damaged("scene", row.name, absl::StrCat("record ", at + 1, " is missing"));
                           at = record.sequence;
                           chain = chain_after(key, at, record.entry, chain);
-                          if (chain != found_record.number(0, 4))
+                          if (chain != found_record.number(0, 4) && !planted(PlantedBug::kChainNotCompared))
                             return damaged("scene", row.name, absl::StrCat("the checksum of record ", at, " is wrong"));
                           return sink(record);
                         }));
   if (at != last) return damaged("scene", row.name, absl::StrCat("record ", at + 1, " is missing"));
-  if (chain != last_chain)
+  if (chain != last_chain && !planted(PlantedBug::kChainNotCompared))
     return damaged("scene", row.name, absl::StrCat("record ", last, " is not the one that was appended"));
   return connection.run("COMMIT", answer_deadline());
 }

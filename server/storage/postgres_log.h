@@ -30,15 +30,15 @@
 #include "core/base/mutex.h"
 #include "core/scene/log/update_log.h"
 #include "server/storage/postgres/append_queue.h"
-#include "server/storage/postgres/connection_pool.h"
+#include "server/storage/postgres/engine_pool.h"
 #include "server/storage/postgres/rows.h"
 #include "server/storage/postgres/tables.h"
 
 namespace locus::server {
 
 struct PostgresOptions {
-  std::string url;     // see EngineAddress::parse()
-  std::string member;  // name by which this daemon leads scenes; empty = a random one
+  std::string url;      // see EngineAddress::parse()
+  uint64_t member = 0;  // id by which this daemon leads scenes, see MemberId; 0 = a random one
   EngineReplication replication = EngineReplication::kStandbys;
 
   std::chrono::milliseconds connect_wait{2'000};  // longest wait for one host to accept a connection
@@ -57,7 +57,7 @@ class PostgresLog final : public UpdateLog {
 
   // Leader of a scene, as the engine has it.
   struct Leader {
-    std::string member;
+    uint64_t member = 0;
     uint64_t token = 0;
   };
   absl::StatusOr<Leader> leader_of(SceneKey scene) const;
@@ -65,6 +65,9 @@ class PostgresLog final : public UpdateLog {
   // its acknowledged records can then be read, and no other daemon can append. ABORTED if another daemon was faster. A
   // call that fails as UNAVAILABLE may be repeated with the same token.
   absl::StatusOr<StoredScene> take_over(SceneKey scene, uint64_t token) LOCUS_EXCLUDES(mutex_);
+  // Begins to append as the leader that the engine already has: this daemon, with the token `token`. ABORTED if leader
+  // or token differ.
+  absl::StatusOr<StoredScene> begin_leading(SceneKey scene, uint64_t token) LOCUS_EXCLUDES(mutex_);
 
   const std::vector<StoredScene>& stored_scenes() const override { return stored_scenes_; }
   const std::vector<StoredMesh>& stored_meshes() const override { return stored_meshes_; }
@@ -117,8 +120,8 @@ class PostgresLog final : public UpdateLog {
     std::atomic<uint64_t> known_last = 0;           // equals `last`, for readers that do not wait for an append
   };
   using LedPtr = std::shared_ptr<Led>;
-  using Change = absl::FunctionRef<absl::Status(Connection&)>;
-  using WasDone = absl::FunctionRef<absl::StatusOr<bool>(Connection&)>;
+  using Change = absl::FunctionRef<absl::Status(EngineConnection&)>;
+  using WasDone = absl::FunctionRef<absl::StatusOr<bool>(EngineConnection&)>;
 
   PostgresLog(const PostgresOptions& options, EngineAddress address);
   absl::Status list_stored();
@@ -127,10 +130,10 @@ class PostgresLog final : public UpdateLog {
   void lead(const StoredScene& scene, uint64_t token, uint64_t chain) LOCUS_EXCLUDES(mutex_);
 
   // Returns a connection; tries again while the engine is away, until the deadline.
-  absl::StatusOr<ConnectionPool::Lease> acquire(ConnectionPool::Use use, Deadline deadline) const;
+  absl::StatusOr<EnginePool::Lease> acquire(EnginePool::Use use, Deadline deadline) const;
   // Returns a connection in a transaction that reads one state of all tables. Tries hosts until one has committed a
   // barrier, so that the state is not older than this call.
-  absl::StatusOr<ConnectionPool::Lease> begin_read() const;
+  absl::StatusOr<EnginePool::Lease> begin_read() const;
   Deadline answer_deadline() const { return std::chrono::steady_clock::now() + options_.answer_wait; }
   Deadline change_deadline() const { return std::chrono::steady_clock::now() + options_.append_wait; }
 
@@ -139,8 +142,8 @@ class PostgresLog final : public UpdateLog {
   absl::Status transact(Change change, WasDone was_done) const;
   // Locks the row of the scene's log in the open transaction and checks that this daemon leads the scene: ABORTED
   // otherwise.
-  absl::Status guard(Connection& connection, Led& led) const LOCUS_REQUIRES(led.writing);
-  absl::Status send_row(Connection& connection, const StoredSceneRow& row) const;
+  absl::Status guard(EngineConnection& connection, Led& led) const LOCUS_REQUIRES(led.writing);
+  absl::Status send_row(EngineConnection& connection, const StoredSceneRow& row) const;
   // Changes the row of a scene that this daemon leads.
   absl::Status change_row(SceneKey scene, absl::FunctionRef<void(StoredSceneRow&)> change) LOCUS_EXCLUDES(mutex_);
 
@@ -154,16 +157,16 @@ class PostgresLog final : public UpdateLog {
 
   // Sends the chunks that `source` returns, each by `sql`, whose parameters are `owner` (if it is not 0), `id`, the
   // number of the chunk, its checksum and its bytes.
-  absl::StatusOr<ChunkList> send_chunks(Connection& connection, const char* sql, uint64_t owner, uint64_t id,
+  absl::StatusOr<ChunkList> send_chunks(EngineConnection& connection, const char* sql, uint64_t owner, uint64_t id,
                                         ChunkSource source) const;
   // Reads the chunks that `sql` returns and compares them with `expected`. DATA_LOSS if they differ; `kind` and `name`
   // are those of damaged().
-  absl::Status read_chunks(Connection& connection, const char* sql, const Parameters& parameters, uint64_t id,
+  absl::Status read_chunks(EngineConnection& connection, const char* sql, const SqlParameters& parameters, uint64_t id,
                            const ChunkList& expected, absl::string_view kind, absl::string_view name,
                            ChunkSink sink) const;
 
   const PostgresOptions options_;
-  mutable ConnectionPool pool_;
+  mutable EnginePool pool_;
   AppendQueue queue_;
   std::vector<StoredScene> stored_scenes_;
   std::vector<StoredMesh> stored_meshes_;

@@ -21,7 +21,7 @@ constexpr const char* kSnapshotChunkSql =
     "INSERT INTO locus.snapshot_chunk (scene, snapshot, number, checksum, bytes)"
     " VALUES ($1::bigint, $2::bigint, $3::bigint, $4::bigint, $5::bytea)";
 
-StoredScene stored_scene(const Rows& rows, size_t row) {
+StoredScene stored_scene(const EngineRows& rows, size_t row) {
   StoredScene stored;
   stored.key = rows.number(row, 0);
   stored.name = std::string(rows.bytes(row, 1));
@@ -41,19 +41,19 @@ StoredScene stored_scene(const Rows& rows, size_t row) {
 #define LOCUS_STORED_SCENES                                                               \
   "SELECT " LOCUS_SCENE_COLUMNS                                                           \
   ", l.last, (SELECT coalesce(sum(octet_length(r.bytes)), 0)::bigint FROM locus.record r" \
-  " WHERE r.scene = s.key), l.chain FROM locus.scene s JOIN locus.scene_log l ON l.scene = s.key "
+  " WHERE r.scene = s.key), l.chain, l.leader, l.token FROM locus.scene s JOIN locus.scene_log l ON l.scene = s.key "
 
 }  // namespace
 
 absl::Status PostgresLog::list_stored() {
-  ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, begin_read());
+  ASSIGN_OR_RETURN(const EnginePool::Lease lease, begin_read());
   lease->add(LOCUS_STORED_SCENES "ORDER BY s.name COLLATE \"C\"");
   lease->add("SELECT " LOCUS_MESH_COLUMNS " FROM locus.mesh m ORDER BY m.name COLLATE \"C\"");
   lease->add("COMMIT");
   RETURN_IF_ERROR(lease->run(change_deadline()));
-  const Rows& scenes = lease->results()[0];
+  const EngineRows& scenes = lease->results()[0];
   for (size_t row = 0; row < scenes.size(); ++row) stored_scenes_.push_back(stored_scene(scenes, row));
-  const Rows& meshes = lease->results()[1];
+  const EngineRows& meshes = lease->results()[1];
   for (size_t row = 0; row < meshes.size(); ++row) {
     const absl::StatusOr<StoredMeshRow> found = mesh_row(meshes, row);
     StoredMesh& stored = stored_meshes_.emplace_back();
@@ -70,7 +70,7 @@ absl::Status PostgresLog::transact(Change change, WasDone was_done) const {
   const Deadline deadline = change_deadline();
   absl::Status status;
   while (true) {
-    ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, acquire(ConnectionPool::Use::kOther, deadline));
+    ASSIGN_OR_RETURN(const EnginePool::Lease lease, acquire(EnginePool::Use::kOther, deadline));
     // A connection that was idle may have been closed by the engine, which shows only now.
     status = lease->run("BEGIN", std::min(deadline, answer_deadline()));
     if (!status.ok() && std::chrono::steady_clock::now() + kBetweenAttempts < deadline) continue;
@@ -85,7 +85,7 @@ absl::Status PostgresLog::transact(Change change, WasDone was_done) const {
   }
   while (std::chrono::steady_clock::now() + kBetweenAttempts < deadline) {
     std::this_thread::sleep_for(kBetweenAttempts);
-    absl::StatusOr<ConnectionPool::Lease> lease = acquire(ConnectionPool::Use::kOther, deadline);
+    absl::StatusOr<EnginePool::Lease> lease = acquire(EnginePool::Use::kOther, deadline);
     if (!lease.ok()) break;
     const absl::StatusOr<bool> done = was_done(**lease);
     if (!done.ok()) continue;
@@ -95,10 +95,11 @@ absl::Status PostgresLog::transact(Change change, WasDone was_done) const {
   return absl::UnavailableError(absl::StrCat("the engine may or may not have stored the change: ", status.message()));
 }
 
-absl::Status PostgresLog::guard(Connection& connection, Led& led) const {
-  connection.add("SELECT token FROM locus.scene_log WHERE scene = $1::bigint FOR UPDATE", Parameters().number(led.key));
+absl::Status PostgresLog::guard(EngineConnection& connection, Led& led) const {
+  connection.add("SELECT token FROM locus.scene_log WHERE scene = $1::bigint FOR UPDATE",
+                 SqlParameters().number(led.key));
   RETURN_IF_ERROR(connection.run(answer_deadline()));
-  const Rows& found = connection.results()[0];
+  const EngineRows& found = connection.results()[0];
   if (found.empty()) return scene_not_stored(led.key);
   if (found.number(0, 0) == led.token && !led.fenced) return absl::OkStatus();
   led.fenced = true;
@@ -106,56 +107,62 @@ absl::Status PostgresLog::guard(Connection& connection, Led& led) const {
 }
 
 absl::StatusOr<PostgresLog::Leader> PostgresLog::leader_of(SceneKey scene) const {
-  ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, begin_read());
-  lease->add("SELECT leader, token FROM locus.scene_log WHERE scene = $1::bigint", Parameters().number(scene));
+  ASSIGN_OR_RETURN(const EnginePool::Lease lease, begin_read());
+  lease->add("SELECT leader, token FROM locus.scene_log WHERE scene = $1::bigint", SqlParameters().number(scene));
   lease->add("COMMIT");
   RETURN_IF_ERROR(lease->run(answer_deadline()));
-  const Rows& found = lease->results()[0];
+  const EngineRows& found = lease->results()[0];
   if (found.empty()) return scene_not_stored(scene);
-  return Leader{std::string(found.bytes(0, 0)), found.number(0, 1)};
+  return Leader{found.number(0, 0), found.number(0, 1)};
 }
 
 absl::StatusOr<StoredScene> PostgresLog::take_over(SceneKey scene, uint64_t token) {
-  const auto take = [&](Connection& connection) -> absl::Status {
+  const auto take = [&](EngineConnection& connection) -> absl::Status {
     connection.add(
-        "UPDATE locus.scene_log SET leader = $3::text, token = token + 1"
+        "UPDATE locus.scene_log SET leader = $3::bigint, token = token + 1"
         " WHERE scene = $1::bigint AND token = $2::bigint",
-        Parameters().number(scene).number(token).text(options_.member));
-    connection.add("SELECT scene FROM locus.scene_log WHERE scene = $1::bigint", Parameters().number(scene));
+        SqlParameters().number(scene).number(token).number(options_.member));
+    connection.add("SELECT scene FROM locus.scene_log WHERE scene = $1::bigint", SqlParameters().number(scene));
     RETURN_IF_ERROR(connection.run(answer_deadline()));
     if (connection.results()[1].empty()) return scene_not_stored(scene);
     if (connection.results()[0].changed() == 1) return absl::OkStatus();
     return absl::AbortedError(absl::StrCat("scene ", scene, " has another leader already"));
   };
   // Also finds a takeover of an earlier call whose outcome was unknown.
-  const auto taken = [&](Connection& connection) -> absl::StatusOr<bool> {
+  const auto taken = [&](EngineConnection& connection) -> absl::StatusOr<bool> {
     connection.add("SELECT leader, token FROM locus.scene_log WHERE scene = $1::bigint FOR UPDATE",
-                   Parameters().number(scene));
+                   SqlParameters().number(scene));
     add_barrier(connection);
     RETURN_IF_ERROR(connection.run(answer_deadline()));
-    const Rows& found = connection.results()[0];
-    return !found.empty() && found.bytes(0, 0) == options_.member && found.number(0, 1) == token + 1;
+    const EngineRows& found = connection.results()[0];
+    return !found.empty() && found.number(0, 0) == options_.member && found.number(0, 1) == token + 1;
   };
   absl::Status status = transact(take, taken);
   if (absl::IsAborted(status)) {
-    ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, acquire(ConnectionPool::Use::kOther, change_deadline()));
+    ASSIGN_OR_RETURN(const EnginePool::Lease lease, acquire(EnginePool::Use::kOther, change_deadline()));
     ASSIGN_OR_RETURN(const bool was_taken, taken(*lease));
     if (was_taken) status = absl::OkStatus();
   }
   RETURN_IF_ERROR(status);
-  ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, begin_read());
-  lease->add(LOCUS_STORED_SCENES "WHERE s.key = $1::bigint", Parameters().number(scene));
+  return begin_leading(scene, token + 1);
+}
+
+absl::StatusOr<StoredScene> PostgresLog::begin_leading(SceneKey scene, uint64_t token) {
+  ASSIGN_OR_RETURN(const EnginePool::Lease lease, begin_read());
+  lease->add(LOCUS_STORED_SCENES "WHERE s.key = $1::bigint", SqlParameters().number(scene));
   lease->add("COMMIT");
   RETURN_IF_ERROR(lease->run(change_deadline()));
-  const Rows& found = lease->results()[0];
+  const EngineRows& found = lease->results()[0];
   if (found.empty()) return scene_not_stored(scene);
   StoredScene stored = stored_scene(found, 0);
-  lead(stored, token + 1, found.number(0, kSceneColumns + 2));
+  if (found.number(0, kSceneColumns + 3) != options_.member || found.number(0, kSceneColumns + 4) != token)
+    return refuse_fenced(stored.name);
+  lead(stored, token, found.number(0, kSceneColumns + 2));
   return stored;
 }
 
-absl::StatusOr<ChunkList> PostgresLog::send_chunks(Connection& connection, const char* sql, uint64_t owner, uint64_t id,
-                                                   ChunkSource source) const {
+absl::StatusOr<ChunkList> PostgresLog::send_chunks(EngineConnection& connection, const char* sql, uint64_t owner,
+                                                   uint64_t id, ChunkSource source) const {
   ChunkList list;
   std::vector<std::string> unsent;  // the parameters borrow the bytes of a chunk until it is sent
   uint64_t bytes = 0;
@@ -164,7 +171,7 @@ absl::StatusOr<ChunkList> PostgresLog::send_chunks(Connection& connection, const
     if (chunk && chunk->size() > kMaxChunkBytes) return refuse_chunk(chunk->size());
     if (chunk) {
       const uint64_t sum = chunk_checksum(id, list.chunks, *chunk);
-      Parameters parameters;
+      SqlParameters parameters;
       if (owner != 0) parameters.number(owner);
       connection.add(sql, parameters.number(id).number(list.chunks).number(sum).bytes(*chunk));
       list.add(chunk->size(), sum);
@@ -177,29 +184,30 @@ absl::StatusOr<ChunkList> PostgresLog::send_chunks(Connection& connection, const
   }
 }
 
-absl::Status PostgresLog::read_chunks(Connection& connection, const char* sql, const Parameters& parameters,
+absl::Status PostgresLog::read_chunks(EngineConnection& connection, const char* sql, const SqlParameters& parameters,
                                       uint64_t id, const ChunkList& expected, absl::string_view kind,
                                       absl::string_view name, ChunkSink sink) const {
   ChunkList list;
-  RETURN_IF_ERROR(connection.stream(sql, parameters, options_.append_wait, [&](const Rows& found) -> absl::Status {
-    const absl::string_view bytes = found.bytes(0, 2);
-    const uint64_t sum = chunk_checksum(id, list.chunks, bytes);
-    if (found.number(0, 0) != list.chunks)
-      return damaged(kind, name, absl::StrCat("chunk ", list.chunks, " is missing"));
-    if (found.number(0, 1) != sum)
-      return damaged(kind, name, absl::StrCat("the checksum of chunk ", list.chunks, " is wrong"));
-    list.add(bytes.size(), sum);
-    return sink(bytes);
-  }));
+  RETURN_IF_ERROR(
+      connection.stream(sql, parameters, options_.append_wait, [&](const EngineRows& found) -> absl::Status {
+        const absl::string_view bytes = found.bytes(0, 2);
+        const uint64_t sum = chunk_checksum(id, list.chunks, bytes);
+        if (found.number(0, 0) != list.chunks)
+          return damaged(kind, name, absl::StrCat("chunk ", list.chunks, " is missing"));
+        if (found.number(0, 1) != sum)
+          return damaged(kind, name, absl::StrCat("the checksum of chunk ", list.chunks, " is wrong"));
+        list.add(bytes.size(), sum);
+        return sink(bytes);
+      }));
   return list == expected ? absl::OkStatus() : damaged(kind, name, absl::StrCat("chunk ", list.chunks, " is missing"));
 }
 
-absl::Status PostgresLog::send_row(Connection& connection, const StoredSceneRow& row) const {
+absl::Status PostgresLog::send_row(EngineConnection& connection, const StoredSceneRow& row) const {
   connection.add(
       "UPDATE locus.scene SET spec = $2::bytea, epoch = $3::bigint, apply_version = $4::bigint, snapshot = $5::bigint,"
       " snapshot_sequence = $6::bigint, snapshot_chain = $7::bigint, chunks = $8::bigint, chunk_bytes = $9::bigint,"
       " digest = $10::bigint, checksum = $11::bigint WHERE key = $1::bigint",
-      Parameters()
+      SqlParameters()
           .number(row.key)
           .bytes(row.spec)
           .number(row.epoch)
@@ -224,18 +232,18 @@ absl::StatusOr<SceneKey> PostgresLog::create_scene(absl::string_view name, absl:
   row.snapshot = random_id();
   // Adds a row without a summary of the snapshot, which send_row() then completes. Returns its key; nullopt if the name
   // is taken. Waits for a transaction that has added the name and is not committed.
-  const auto add_name = [&](Connection& connection) -> absl::StatusOr<std::optional<SceneKey>> {
+  const auto add_name = [&](EngineConnection& connection) -> absl::StatusOr<std::optional<SceneKey>> {
     connection.add(
         "INSERT INTO locus.scene (name, spec, epoch, apply_version, snapshot, snapshot_sequence, snapshot_chain, "
         "chunks,"
         " chunk_bytes, digest, checksum) VALUES ($1::text, '', 0, 0, 0, 0, 0, 0, 0, 0, 0)"
         " ON CONFLICT (name) DO NOTHING RETURNING key",
-        Parameters().text(row.name));
+        SqlParameters().text(row.name));
     RETURN_IF_ERROR(connection.run(answer_deadline()));
-    const Rows& found = connection.results()[0];
+    const EngineRows& found = connection.results()[0];
     return found.empty() ? std::nullopt : std::optional(found.number(0, 0));
   };
-  const auto create = [&](Connection& connection) -> absl::Status {
+  const auto create = [&](EngineConnection& connection) -> absl::Status {
     ASSIGN_OR_RETURN(const std::optional<SceneKey> key, add_name(connection));
     if (!key) return scene_already_stored(name);
     row.key = *key;
@@ -243,18 +251,18 @@ absl::StatusOr<SceneKey> PostgresLog::create_scene(absl::string_view name, absl:
     ASSIGN_OR_RETURN(row.chunks, send_chunks(connection, kSnapshotChunkSql, row.key, row.snapshot, state));
     connection.add(
         "INSERT INTO locus.scene_log (scene, leader, token, last, chain)"
-        " VALUES ($1::bigint, $2::text, 1, 0, $3::bigint)",
-        Parameters().number(row.key).text(options_.member).number(row.snapshot_chain));
+        " VALUES ($1::bigint, $2::bigint, 1, 0, $3::bigint)",
+        SqlParameters().number(row.key).number(options_.member).number(row.snapshot_chain));
     return send_row(connection, row);
   };
-  const auto was_done = [&](Connection& connection) -> absl::StatusOr<bool> {
+  const auto was_done = [&](EngineConnection& connection) -> absl::StatusOr<bool> {
     RETURN_IF_ERROR(connection.run("BEGIN", answer_deadline()));
     ASSIGN_OR_RETURN(const std::optional<SceneKey> added, add_name(connection));
     if (added) {  // the name was free, so the scene had not been stored
       RETURN_IF_ERROR(connection.run("ROLLBACK", answer_deadline()));
       return false;
     }
-    connection.add("SELECT key FROM locus.scene WHERE key = $1::bigint", Parameters().number(row.key));
+    connection.add("SELECT key FROM locus.scene WHERE key = $1::bigint", SqlParameters().number(row.key));
     add_barrier(connection);
     connection.add("COMMIT");
     RETURN_IF_ERROR(connection.run(answer_deadline()));
@@ -273,15 +281,15 @@ absl::Status PostgresLog::delete_scene(SceneKey key) {
   ASSIGN_OR_RETURN(const LedPtr state, led(key));
   Led& scene = *state;
   MutexLock writing(scene.writing);
-  const auto remove = [&](Connection& connection) LOCUS_REQUIRES(scene.writing) -> absl::Status {
+  const auto remove = [&](EngineConnection& connection) LOCUS_REQUIRES(scene.writing) -> absl::Status {
     RETURN_IF_ERROR(guard(connection, scene));
-    connection.add("DELETE FROM locus.record WHERE scene = $1::bigint", Parameters().number(key));
-    connection.add("DELETE FROM locus.snapshot_chunk WHERE scene = $1::bigint", Parameters().number(key));
-    connection.add("DELETE FROM locus.scene WHERE key = $1::bigint", Parameters().number(key));
+    connection.add("DELETE FROM locus.record WHERE scene = $1::bigint", SqlParameters().number(key));
+    connection.add("DELETE FROM locus.snapshot_chunk WHERE scene = $1::bigint", SqlParameters().number(key));
+    connection.add("DELETE FROM locus.scene WHERE key = $1::bigint", SqlParameters().number(key));
     return connection.run(change_deadline());
   };
-  absl::Status status = transact(remove, [&](Connection& connection) -> absl::StatusOr<bool> {
-    connection.add("SELECT key FROM locus.scene WHERE key = $1::bigint FOR UPDATE", Parameters().number(key));
+  absl::Status status = transact(remove, [&](EngineConnection& connection) -> absl::StatusOr<bool> {
+    connection.add("SELECT key FROM locus.scene WHERE key = $1::bigint FOR UPDATE", SqlParameters().number(key));
     add_barrier(connection);
     RETURN_IF_ERROR(connection.run(answer_deadline()));
     return connection.results()[0].empty();
@@ -297,20 +305,20 @@ absl::Status PostgresLog::change_row(SceneKey key, absl::FunctionRef<void(Stored
   Led& scene = *state;
   MutexLock writing(scene.writing);
   StoredSceneRow row;
-  const auto update = [&](Connection& connection) LOCUS_REQUIRES(scene.writing) -> absl::Status {
+  const auto update = [&](EngineConnection& connection) LOCUS_REQUIRES(scene.writing) -> absl::Status {
     RETURN_IF_ERROR(guard(connection, scene));
     connection.add("SELECT " LOCUS_SCENE_COLUMNS " FROM locus.scene s WHERE s.key = $1::bigint FOR UPDATE",
-                   Parameters().number(key));
+                   SqlParameters().number(key));
     RETURN_IF_ERROR(connection.run(answer_deadline()));
     ASSIGN_OR_RETURN(row, scene_row(connection.results()[0], 0));
     change(row);
     return send_row(connection, row);
   };
-  const auto was_done = [&](Connection& connection) -> absl::StatusOr<bool> {
-    connection.add("SELECT checksum FROM locus.scene WHERE key = $1::bigint FOR UPDATE", Parameters().number(key));
+  const auto was_done = [&](EngineConnection& connection) -> absl::StatusOr<bool> {
+    connection.add("SELECT checksum FROM locus.scene WHERE key = $1::bigint FOR UPDATE", SqlParameters().number(key));
     add_barrier(connection);
     RETURN_IF_ERROR(connection.run(answer_deadline()));
-    const Rows& found = connection.results()[0];
+    const EngineRows& found = connection.results()[0];
     return !found.empty() && found.number(0, 0) == checksum_of(row);
   };
   RETURN_IF_ERROR(transact(update, was_done));
@@ -330,9 +338,9 @@ absl::Status PostgresLog::write_snapshot(SceneKey key, uint64_t sequence, ChunkS
   ASSIGN_OR_RETURN(const LedPtr led_scene, led(key));
   Led& scene = *led_scene;
   const uint64_t id = random_id();
-  const auto write = [&](Connection& connection) -> absl::Status {
+  const auto write = [&](EngineConnection& connection) -> absl::Status {
     connection.add("SELECT " LOCUS_SCENE_COLUMNS " FROM locus.scene s WHERE s.key = $1::bigint",
-                   Parameters().number(key));
+                   SqlParameters().number(key));
     RETURN_IF_ERROR(connection.run(answer_deadline()));
     if (connection.results()[0].empty()) return scene_not_stored(key);
     ASSIGN_OR_RETURN(StoredSceneRow row, scene_row(connection.results()[0], 0));
@@ -346,9 +354,9 @@ absl::Status PostgresLog::write_snapshot(SceneKey key, uint64_t sequence, ChunkS
     connection.add(
         "SELECT s.snapshot, r.chain FROM locus.scene s LEFT JOIN locus.record r ON r.scene = s.key"
         " AND r.sequence = $2::bigint WHERE s.key = $1::bigint",
-        Parameters().number(key).number(sequence));
+        SqlParameters().number(key).number(sequence));
     RETURN_IF_ERROR(connection.run(answer_deadline()));
-    const Rows& found = connection.results()[0];
+    const EngineRows& found = connection.results()[0];
     if (found.empty()) return scene_not_stored(key);
     if (found.number(0, 0) != replaced)
       return absl::AbortedError(
@@ -360,30 +368,30 @@ absl::Status PostgresLog::write_snapshot(SceneKey key, uint64_t sequence, ChunkS
     row.snapshot = id;
     row.snapshot_sequence = sequence;
     connection.add("DELETE FROM locus.snapshot_chunk WHERE scene = $1::bigint AND snapshot = $2::bigint",
-                   Parameters().number(key).number(replaced));
+                   SqlParameters().number(key).number(replaced));
     connection.add("DELETE FROM locus.record WHERE scene = $1::bigint AND sequence <= $2::bigint",
-                   Parameters().number(key).number(sequence));
+                   SqlParameters().number(key).number(sequence));
     return send_row(connection, row);
   };
-  return transact(write, [&](Connection& connection) -> absl::StatusOr<bool> {
-    connection.add("SELECT snapshot FROM locus.scene WHERE key = $1::bigint FOR UPDATE", Parameters().number(key));
+  return transact(write, [&](EngineConnection& connection) -> absl::StatusOr<bool> {
+    connection.add("SELECT snapshot FROM locus.scene WHERE key = $1::bigint FOR UPDATE", SqlParameters().number(key));
     add_barrier(connection);
     RETURN_IF_ERROR(connection.run(answer_deadline()));
-    const Rows& found = connection.results()[0];
+    const EngineRows& found = connection.results()[0];
     return !found.empty() && found.number(0, 0) == id;
   });
 }
 
 absl::Status PostgresLog::read_snapshot(SceneKey key, ChunkSink sink) const {
-  ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, begin_read());
-  lease->add("SELECT " LOCUS_SCENE_COLUMNS " FROM locus.scene s WHERE s.key = $1::bigint", Parameters().number(key));
+  ASSIGN_OR_RETURN(const EnginePool::Lease lease, begin_read());
+  lease->add("SELECT " LOCUS_SCENE_COLUMNS " FROM locus.scene s WHERE s.key = $1::bigint", SqlParameters().number(key));
   RETURN_IF_ERROR(lease->run(answer_deadline()));
   if (lease->results()[0].empty()) return scene_not_stored(key);
   ASSIGN_OR_RETURN(const StoredSceneRow row, scene_row(lease->results()[0], 0));
   RETURN_IF_ERROR(read_chunks(*lease,
                               "SELECT number, checksum, bytes FROM locus.snapshot_chunk"
                               " WHERE scene = $1::bigint AND snapshot = $2::bigint ORDER BY number",
-                              Parameters().number(key).number(row.snapshot), row.snapshot, row.chunks, "scene",
+                              SqlParameters().number(key).number(row.snapshot), row.snapshot, row.chunks, "scene",
                               row.name, sink));
   return lease->run("COMMIT", answer_deadline());
 }

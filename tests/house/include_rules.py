@@ -35,7 +35,7 @@ ALLOWED = {
     "server/storage/rocksdb": ["server/storage/rows", "core/*"],
     "server/storage/postgres": ["server/storage/rows", "core/*"],
     "server/storage/integrity": ["server/storage/rocksdb", "server/storage/rows", "core/*"],
-    "server/storage": ["server/storage/*", "core/*"],
+    "server/storage": ["server/storage/*", "server/cluster", "core/*"],
     "server/connections": ["server/config", "core/base"],
     "server/security": ["server/config", "core/base"],
     "server/observability": ["server/connections", "server/security", "server/config", "core/index", "core/base"],

@@ -42,9 +42,9 @@ class ClusterEngineJudge : public ::testing::TestWithParam<std::function<std::un
     for (const server::SeenBeat& seen : beats) ids.push_back(seen.id);
     return ids;
   }
-  static std::vector<SceneKey> keys(const absl::StatusOr<std::vector<server::SceneRow>>& rows) {
+  static std::vector<SceneKey> keys(const absl::StatusOr<std::vector<server::LeaderRow>>& rows) {
     std::vector<SceneKey> keys;
-    for (const server::SceneRow& row : rows.value()) keys.push_back(row.key);
+    for (const server::LeaderRow& row : rows.value()) keys.push_back(row.key);
     return keys;
   }
   SceneKey add_scene() { return tested_->add_scene(); }
@@ -117,7 +117,7 @@ TEST_P(ClusterEngineJudge, MembersAreTheLivingOnesWithTheirLoads) {
 TEST_P(ClusterEngineJudge, ATakeoverNeedsTheTokenAndALivingMember) {
   join({10, 20});
   const SceneKey scene = add_scene();
-  const server::SceneRow row = engine().take_over(scene, 0, 10).value();
+  const server::LeaderRow row = engine().take_over(scene, 0, 10).value();
   EXPECT_EQ(row.key, scene);
   EXPECT_EQ(row.leader, 10u);
   EXPECT_EQ(row.token, 1u);
@@ -140,7 +140,7 @@ TEST_P(ClusterEngineJudge, AHandOverNeedsTheTokenTheLeaderAndALivingMember) {
   EXPECT_EQ(engine().hand_over(scene, 1, 10, 77).status().code(), Code::kFailedPrecondition);
   EXPECT_EQ(engine().hand_over(scene, 1, 10, 20).value().token, 2u);
   EXPECT_EQ(engine().hand_over(scene, 1, 10, 20).status().code(), Code::kAborted) << "again";
-  const server::SceneRow row = engine().hand_over(scene, 2, 20, 0).value();
+  const server::LeaderRow row = engine().hand_over(scene, 2, 20, 0).value();
   EXPECT_EQ(row.leader, 0u);
   EXPECT_EQ(row.token, 3u);
 }

@@ -124,7 +124,7 @@ class ClusterSchedule {
   }
 
   // Rows of the scenes as each daemon, by number, has heard of them. Destroyed after the cluster.
-  std::map<uint64_t, std::map<SceneKey, server::SceneRow>> known_;
+  std::map<uint64_t, std::map<SceneKey, server::LeaderRow>> known_;
   std::vector<SceneKey> scenes_;
   SimulatedCluster cluster_;
   Random random_;

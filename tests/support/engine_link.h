@@ -55,21 +55,21 @@ class EngineLink : public server::ClusterEngine {
     return call<absl::StatusOr<std::vector<server::MemberRow>>>(CallKind::kRead,
                                                                 [&engine = engine_] { return engine.members(); });
   }
-  absl::StatusOr<std::vector<server::SceneRow>> scenes_led_by(server::MemberId leader) override {
-    return call<absl::StatusOr<std::vector<server::SceneRow>>>(
+  absl::StatusOr<std::vector<server::LeaderRow>> scenes_led_by(server::MemberId leader) override {
+    return call<absl::StatusOr<std::vector<server::LeaderRow>>>(
         CallKind::kRead, [=, &engine = engine_] { return engine.scenes_led_by(leader); });
   }
-  absl::StatusOr<std::vector<server::SceneRow>> scenes_without_leader() override {
-    return call<absl::StatusOr<std::vector<server::SceneRow>>>(
+  absl::StatusOr<std::vector<server::LeaderRow>> scenes_without_leader() override {
+    return call<absl::StatusOr<std::vector<server::LeaderRow>>>(
         CallKind::kRead, [&engine = engine_] { return engine.scenes_without_leader(); });
   }
-  absl::StatusOr<server::SceneRow> take_over(SceneKey scene, server::Token seen, server::MemberId to) override {
-    return call<absl::StatusOr<server::SceneRow>>(CallKind::kOtherWrite,
-                                                  [=, &engine = engine_] { return engine.take_over(scene, seen, to); });
+  absl::StatusOr<server::LeaderRow> take_over(SceneKey scene, server::Token seen, server::MemberId to) override {
+    return call<absl::StatusOr<server::LeaderRow>>(
+        CallKind::kOtherWrite, [=, &engine = engine_] { return engine.take_over(scene, seen, to); });
   }
-  absl::StatusOr<server::SceneRow> hand_over(SceneKey scene, server::Token token, server::MemberId from,
-                                             server::MemberId to) override {
-    return call<absl::StatusOr<server::SceneRow>>(
+  absl::StatusOr<server::LeaderRow> hand_over(SceneKey scene, server::Token token, server::MemberId from,
+                                              server::MemberId to) override {
+    return call<absl::StatusOr<server::LeaderRow>>(
         CallKind::kOtherWrite, [=, &engine = engine_] { return engine.hand_over(scene, token, from, to); });
   }
 

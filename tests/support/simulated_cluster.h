@@ -68,7 +68,7 @@ class SimulatedCluster {
     uint64_t load() override { return load_of_daemon(); }
     void start_leading(const LedScene& scene) override;
     void stop_leading(SceneKey scene, server::Token token, server::StopReason reason) override;
-    void leader_changed(const server::SceneRow&) override {}
+    void leader_changed(const server::LeaderRow&) override {}
     std::vector<FollowedScene> followed_scenes(server::MemberId leader) override { return followed_of(leader); }
     std::vector<server::MemberId> caught_up_followers(SceneKey scene) override { return followers_of(scene); }
 
@@ -184,7 +184,7 @@ class SimulatedCluster {
     std::map<server::MemberId, Daemon*> members;
     for (const auto& [number, daemon] : daemons_) members[daemon->id()] = daemon.get();
     for (const SceneKey key : keys) {
-      const server::SceneRow row = engine_.row(key);
+      const server::LeaderRow row = engine_.row(key);
       const auto leader = members.find(row.leader);
       if (row.leader == 0 || leader == members.end()) return absl::StrCat("scene ", key, " has no living leader");
       const auto lease = leader->second->leadership().find(key);

@@ -27,7 +27,7 @@ namespace locus::test {
 struct LeaderChange {
   enum class Cause : uint8_t { kTakeOver, kHandOver };
   Cause cause = Cause::kTakeOver;
-  server::SceneRow before, after;
+  server::LeaderRow before, after;
   bool leader_lived = false;  // the leader before was a living member
 };
 
@@ -35,7 +35,7 @@ class SimulatedEngine : public server::ClusterEngine {
  public:
   using MemberId = server::MemberId;
   using Token = server::Token;
-  using SceneRow = server::SceneRow;
+  using LeaderRow = server::LeaderRow;
   using MemberRow = server::MemberRow;
 
   std::function<void(const LeaderChange&)> on_leader_change;
@@ -56,7 +56,7 @@ class SimulatedEngine : public server::ClusterEngine {
     }
   }
   // Returns the row of a scene. Precondition: it exists.
-  SceneRow row(SceneKey key) const {
+  LeaderRow row(SceneKey key) const {
     const MutexLock lock(mutex_);
     return scenes_.at(key);
   }
@@ -129,23 +129,23 @@ class SimulatedEngine : public server::ClusterEngine {
     return rows;
   }
 
-  absl::StatusOr<std::vector<SceneRow>> scenes_led_by(MemberId leader) override {
+  absl::StatusOr<std::vector<LeaderRow>> scenes_led_by(MemberId leader) override {
     const MutexLock lock(mutex_);
     return rows_of(leader);
   }
 
-  absl::StatusOr<std::vector<SceneRow>> scenes_without_leader() override {
+  absl::StatusOr<std::vector<LeaderRow>> scenes_without_leader() override {
     const MutexLock lock(mutex_);
-    std::vector<SceneRow> found;
+    std::vector<LeaderRow> found;
     for (const auto& [leader, keys] : led_) {
       if (leader != 0 && members_.contains(leader)) continue;
-      for (const SceneRow& row : rows_of(leader))
+      for (const LeaderRow& row : rows_of(leader))
         if (found.size() < kMaxListed) found.push_back(row);
     }
     return found;
   }
 
-  absl::StatusOr<SceneRow> take_over(SceneKey scene, Token seen, MemberId to) override {
+  absl::StatusOr<LeaderRow> take_over(SceneKey scene, Token seen, MemberId to) override {
     const MutexLock lock(mutex_);
     const auto found = scenes_.find(scene);
     if (found == scenes_.end()) return absl::NotFoundError("no such scene");
@@ -155,7 +155,7 @@ class SimulatedEngine : public server::ClusterEngine {
     return lead(found->second, to, LeaderChange::Cause::kTakeOver);
   }
 
-  absl::StatusOr<SceneRow> hand_over(SceneKey scene, Token token, MemberId from, MemberId to) override {
+  absl::StatusOr<LeaderRow> hand_over(SceneKey scene, Token token, MemberId from, MemberId to) override {
     const MutexLock lock(mutex_);
     const auto found = scenes_.find(scene);
     if (found == scenes_.end()) return absl::NotFoundError("no such scene");
@@ -177,14 +177,14 @@ class SimulatedEngine : public server::ClusterEngine {
     dead_.insert(id);
   }
 
-  std::vector<SceneRow> rows_of(MemberId leader) const LOCUS_REQUIRES(mutex_) {
-    std::vector<SceneRow> rows;
+  std::vector<LeaderRow> rows_of(MemberId leader) const LOCUS_REQUIRES(mutex_) {
+    std::vector<LeaderRow> rows;
     if (const auto led = led_.find(leader); led != led_.end())
       for (const SceneKey key : led->second) rows.push_back(scenes_.at(key));
     return rows;
   }
 
-  SceneRow lead(SceneRow& row, MemberId to, LeaderChange::Cause cause) LOCUS_REQUIRES(mutex_) {
+  LeaderRow lead(LeaderRow& row, MemberId to, LeaderChange::Cause cause) LOCUS_REQUIRES(mutex_) {
     const LeaderChange change = {
         cause, row, {row.key, to, row.token + 1, row.last_sequence, row.epoch}, living_.contains(row.leader)};
     led_[row.leader].erase(row.key);
@@ -199,7 +199,7 @@ class SimulatedEngine : public server::ClusterEngine {
   absl::flat_hash_map<MemberId, Member> members_ LOCUS_GUARDED_BY(mutex_);
   std::set<MemberId> living_ LOCUS_GUARDED_BY(mutex_);
   std::set<MemberId> dead_ LOCUS_GUARDED_BY(mutex_);
-  absl::flat_hash_map<SceneKey, SceneRow> scenes_ LOCUS_GUARDED_BY(mutex_);
+  absl::flat_hash_map<SceneKey, LeaderRow> scenes_ LOCUS_GUARDED_BY(mutex_);
   std::map<MemberId, std::set<SceneKey>> led_ LOCUS_GUARDED_BY(mutex_);  // by leader
 };
 

@@ -15,7 +15,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/check.h"
-#include "server/storage/rocksdb_log.h"
+#include "core/scene/log/update_log.h"
 #include "tests/support/random.h"
 #include "tests/support/temporary_folder.h"
 

@@ -11,7 +11,7 @@ namespace {
 
 RowWriter& add(RowWriter& out, const ChunkList& list) { return out.u64(list.chunks).u64(list.bytes).u64(list.digest); }
 
-ChunkList chunk_list(const Rows& rows, size_t row, int column) {
+ChunkList chunk_list(const EngineRows& rows, size_t row, int column) {
   return {rows.number(row, column), rows.number(row, column + 1), rows.number(row, column + 2)};
 }
 
@@ -22,7 +22,7 @@ absl::Status damaged(absl::string_view kind, absl::string_view name, absl::strin
       absl::StrCat(kind, " '", name, "' is damaged: ", what, "; restore it from a backup of the engine, or delete it"));
 }
 
-absl::StatusOr<StoredSceneRow> scene_row(const Rows& rows, size_t row) {
+absl::StatusOr<StoredSceneRow> scene_row(const EngineRows& rows, size_t row) {
   StoredSceneRow found;
   found.key = rows.number(row, 0);
   found.name = std::string(rows.bytes(row, 1));
@@ -38,7 +38,7 @@ absl::StatusOr<StoredSceneRow> scene_row(const Rows& rows, size_t row) {
   return found;
 }
 
-absl::StatusOr<StoredMeshRow> mesh_row(const Rows& rows, size_t row) {
+absl::StatusOr<StoredMeshRow> mesh_row(const EngineRows& rows, size_t row) {
   StoredMeshRow found;
   found.name = std::string(rows.bytes(row, 0));
   const absl::string_view sha256 = rows.bytes(row, 1);
@@ -71,10 +71,6 @@ uint64_t chain_after(SceneKey scene, uint64_t sequence, const LogEntry& entry, u
 
 uint64_t chunk_checksum(uint64_t id, uint64_t number, absl::string_view bytes) {
   return checksum(bytes, checksum(RowWriter().u64(id).u64(number).view()));
-}
-
-absl::string_view view_of(const Sha256& sha256) {
-  return {reinterpret_cast<const char*>(sha256.data()), sha256.size()};
 }
 
 uint64_t random_id() {

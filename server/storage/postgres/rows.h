@@ -1,5 +1,5 @@
-// Rows of scenes and meshes in PostgreSQL, and their checksums, which detect a changed or exchanged row. FORMAT.md
-// describes the columns. Free functions on plain data; any thread.
+// EngineRows of scenes and meshes in PostgreSQL, and their checksums, which detect a changed or exchanged row.
+// FORMAT.md describes the columns. Free functions on plain data; any thread.
 #ifndef LOCUS_SERVER_STORAGE_POSTGRES_ROWS_H_
 #define LOCUS_SERVER_STORAGE_POSTGRES_ROWS_H_
 
@@ -8,7 +8,7 @@
 
 #include "absl/status/statusor.h"
 #include "core/scene/log/update_log.h"
-#include "server/storage/postgres/connection.h"
+#include "server/storage/postgres/engine_connection.h"
 #include "server/storage/rows/checksums.h"
 
 namespace locus::server {
@@ -45,8 +45,8 @@ inline constexpr int kSceneColumns = 12;
 absl::Status damaged(absl::string_view kind, absl::string_view name, absl::string_view what);
 
 // Decode one row. DATA_LOSS, with the name, if its checksum is wrong.
-absl::StatusOr<StoredSceneRow> scene_row(const Rows& rows, size_t row);
-absl::StatusOr<StoredMeshRow> mesh_row(const Rows& rows, size_t row);
+absl::StatusOr<StoredSceneRow> scene_row(const EngineRows& rows, size_t row);
+absl::StatusOr<StoredMeshRow> mesh_row(const EngineRows& rows, size_t row);
 
 uint64_t checksum_of(const StoredSceneRow& row);
 uint64_t checksum_of(const StoredMeshRow& row);
@@ -58,7 +58,6 @@ uint64_t chain_after(SceneKey scene, uint64_t sequence, const LogEntry& entry, u
 // Returns the checksum of the chunk `number` of the snapshot or mesh content `id`.
 uint64_t chunk_checksum(uint64_t id, uint64_t number, absl::string_view bytes);
 
-absl::string_view view_of(const Sha256& sha256);
 // Returns a random id for the chunks of a snapshot or mesh.
 uint64_t random_id();
 

@@ -17,8 +17,14 @@ constexpr const char* kTables[] = {
     " snapshot_sequence bigint NOT NULL, snapshot_chain bigint NOT NULL, chunks bigint NOT NULL,"
     " chunk_bytes bigint NOT NULL, digest bigint NOT NULL, checksum bigint NOT NULL)",
     "CREATE TABLE locus.scene_log (scene bigint PRIMARY KEY REFERENCES locus.scene ON DELETE CASCADE,"
-    " leader text NOT NULL, token bigint NOT NULL, last bigint NOT NULL, chain bigint NOT NULL)"
+    " leader bigint NOT NULL, token bigint NOT NULL, last bigint NOT NULL, chain bigint NOT NULL)"
     " WITH (fillfactor = 50, autovacuum_vacuum_scale_factor = 0, autovacuum_vacuum_threshold = 10000)",
+    "CREATE INDEX scene_of_leader ON locus.scene_log (leader)",
+    "CREATE TABLE locus.member (id bigint PRIMARY KEY, address text NOT NULL, zone text NOT NULL,"
+    " version text NOT NULL, load bigint NOT NULL, beat bigint NOT NULL, dead bigint NOT NULL,"
+    " assigned bigint NOT NULL)"
+    " WITH (fillfactor = 50, autovacuum_vacuum_scale_factor = 0, autovacuum_vacuum_threshold = 1000)",
+    "CREATE INDEX dead_member ON locus.member (id) WHERE dead = 1",
     "CREATE TABLE locus.record (scene bigint NOT NULL, sequence bigint NOT NULL, epoch bigint NOT NULL,"
     " writer bigint NOT NULL, batch bigint NOT NULL, chain bigint NOT NULL, bytes bytea NOT NULL,"
     " PRIMARY KEY (scene, sequence))"
@@ -45,19 +51,19 @@ absl::Status refuse_engine(absl::string_view why) { return absl::FailedPrecondit
 
 }  // namespace
 
-void add_engine_settings(Connection& connection) {
+void add_engine_settings(EngineConnection& connection) {
   connection.add(
       "SELECT current_setting('fsync'), current_setting('full_page_writes'), current_setting('synchronous_commit'),"
       " current_setting('synchronous_standby_names'), current_setting('server_encoding')");
 }
 
-absl::Status check_engine(Connection& connection, EngineReplication replication, Deadline deadline) {
+absl::Status check_engine(EngineConnection& connection, EngineReplication replication, Deadline deadline) {
   add_engine_settings(connection);
   RETURN_IF_ERROR(connection.run(deadline));
   return check_engine_settings(connection.results()[0], replication);
 }
 
-absl::Status check_engine_settings(const Rows& found, EngineReplication replication) {
+absl::Status check_engine_settings(const EngineRows& found, EngineReplication replication) {
   const absl::string_view fsync = found.bytes(0, 0), pages = found.bytes(0, 1), commit = found.bytes(0, 2),
                           standbys = found.bytes(0, 3), encoding = found.bytes(0, 4);
   if (fsync != "on")
@@ -78,13 +84,13 @@ absl::Status check_engine_settings(const Rows& found, EngineReplication replicat
   return absl::OkStatus();
 }
 
-absl::Status prepare_tables(Connection& connection, Deadline deadline) {
+absl::Status prepare_tables(EngineConnection& connection, Deadline deadline) {
   absl::Status status;
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
     RETURN_IF_ERROR(connection.run("SELECT (to_regclass('locus.format') IS NOT NULL)::int::bigint", deadline));
     if (connection.results()[0].number(0, 0) == 1) {
       RETURN_IF_ERROR(connection.run("SELECT number FROM locus.format", deadline));
-      const Rows& found = connection.results()[0];
+      const EngineRows& found = connection.results()[0];
       const uint64_t format = found.empty() ? 0 : found.number(0, 0);
       if (format >= 1 && format <= kTablesFormat) return absl::OkStatus();
       return refuse_engine(absl::StrCat("the engine's tables have format ", format,
@@ -92,7 +98,7 @@ absl::Status prepare_tables(Connection& connection, Deadline deadline) {
                                         ": use a version of locusd that is at least as new as theirs"));
     }
     for (const char* const table : kTables) connection.add(table);
-    connection.add("INSERT INTO locus.format VALUES ($1::bigint)", Parameters().number(kTablesFormat));
+    connection.add("INSERT INTO locus.format VALUES ($1::bigint)", SqlParameters().number(kTablesFormat));
     status = connection.run(deadline);
     // Another daemon may create the tables at the same time: then this attempt fails, and the next one finds them.
     if (!status.ok() && !connection.usable()) return status;
@@ -100,6 +106,6 @@ absl::Status prepare_tables(Connection& connection, Deadline deadline) {
   return status.ok() ? absl::UnavailableError("the engine's tables were created and deleted again") : status;
 }
 
-void add_barrier(Connection& connection) { connection.add("SELECT number FROM locus.format FOR KEY SHARE"); }
+void add_barrier(EngineConnection& connection) { connection.add("SELECT number FROM locus.format FOR KEY SHARE"); }
 
 }  // namespace locus::server

@@ -4,7 +4,7 @@
 #define LOCUS_SERVER_STORAGE_POSTGRES_TABLES_H_
 
 #include "absl/status/status.h"
-#include "server/storage/postgres/connection.h"
+#include "server/storage/postgres/engine_connection.h"
 
 namespace locus::server {
 
@@ -17,22 +17,22 @@ enum class EngineReplication : uint8_t {
 };
 
 // Adds a statement that returns the settings of the engine on which the promises depend.
-void add_engine_settings(Connection& connection);
+void add_engine_settings(EngineConnection& connection);
 // Checks the result of this statement. FAILED_PRECONDITION, with the setting to change, if a commit might be
 // acknowledged before a second machine has synced it, if a crash might damage the data, or if the database cannot store
 // every name.
-absl::Status check_engine_settings(const Rows& settings, EngineReplication replication);
+absl::Status check_engine_settings(const EngineRows& settings, EngineReplication replication);
 
 // Runs and checks the statement.
-absl::Status check_engine(Connection& connection, EngineReplication replication, Deadline deadline);
+absl::Status check_engine(EngineConnection& connection, EngineReplication replication, Deadline deadline);
 
 // Creates the tables if the database has none. FAILED_PRECONDITION if their format is newer than kTablesFormat.
-absl::Status prepare_tables(Connection& connection, Deadline deadline);
+absl::Status prepare_tables(EngineConnection& connection, Deadline deadline);
 
 // Adds a statement that makes the commit of its transaction wait for the standbys, as the commit of a change does, by a
 // shared lock of a row. A transaction that only reads does not wait: after a restart of PostgreSQL it may see commits
 // that no standby has, and an isolated old primary answers it, too.
-void add_barrier(Connection& connection);
+void add_barrier(EngineConnection& connection);
 
 }  // namespace locus::server
 

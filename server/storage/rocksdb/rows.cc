@@ -13,10 +13,6 @@ constexpr size_t kContentRowBytes = 4 * 8;
 
 std::string tagged(char tag, absl::string_view rest) { return std::string(1, tag).append(rest.data(), rest.size()); }
 
-absl::string_view view_of(const Sha256& sha256) {
-  return {reinterpret_cast<const char*>(sha256.data()), sha256.size()};
-}
-
 }  // namespace
 
 std::string scene_key(SceneKey scene) { return RowWriter().u8(kSceneTag).big_u64(scene).take(); }

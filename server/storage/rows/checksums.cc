@@ -6,6 +6,10 @@
 
 namespace locus::server {
 
+absl::string_view view_of(const Sha256& sha256) {
+  return {reinterpret_cast<const char*>(sha256.data()), sha256.size()};
+}
+
 uint64_t checksum(absl::string_view bytes, uint64_t seed) {
   return XXH3_64bits_withSeed(bytes.data(), bytes.size(), seed);
 }

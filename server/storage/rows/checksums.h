@@ -14,6 +14,8 @@ namespace locus::server {
 
 using Sha256 = std::array<uint8_t, 32>;
 
+absl::string_view view_of(const Sha256& sha256);
+
 // Returns the 64-bit XXH3 hash of `bytes`.
 uint64_t checksum(absl::string_view bytes, uint64_t seed = 0);
 

@@ -53,7 +53,7 @@ class ThreadedHost : public ClusterHost {
     led_.erase(scene);
     leading_ = led_.size();
   }
-  void leader_changed(const SceneRow&) override {}
+  void leader_changed(const LeaderRow&) override {}
   std::vector<FollowedScene> followed_scenes(MemberId) override { return {}; }
   std::vector<MemberId> caught_up_followers(SceneKey) override {
     const MutexLock lock(mutex_);

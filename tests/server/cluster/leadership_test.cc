@@ -53,7 +53,7 @@ class LeadershipTest : public ::testing::Test {
   // Lets a daemon follow a scene, with all of its records.
   void follow(Daemon& daemon, SceneKey key) {
     daemon.followed_of = [this, key](MemberId leader) {
-      const SceneRow row = cluster_.engine().row(key);
+      const LeaderRow row = cluster_.engine().row(key);
       std::vector<ClusterHost::FollowedScene> followed;
       if (row.leader == leader) followed.push_back({key, row.token});
       return followed;

@@ -11,7 +11,7 @@ using ::testing::IsEmpty;
 using ::testing::SizeIs;
 using ::testing::UnorderedElementsAre;
 
-SceneRow led_row(SceneKey key, Token token) { return {key, 1, token, 0, 1}; }
+LeaderRow led_row(SceneKey key, Token token) { return {key, 1, token, 0, 1}; }
 
 class LedScenesTest : public ::testing::Test {
  protected:

@@ -304,6 +304,30 @@ TEST_F(PostgresLogFaultTest, AppendsFollowThePromotedStandby) {
               absl::StrCat(log_->latest(scene).value()));
 }
 
+// After a restart, a primary whose standby is away shows a commit that only its own disk has.
+TEST_F(PostgresLogFaultTest, AnAppendThatNoStandbyHasIsNotAcknowledged) {
+  log_ = nullptr;
+  engine_ = std::make_unique<PostgresServer>(PostgresServer::Settings{"synchronous_standby_names=two"});
+  PostgresServer second(*engine_, "two");
+  PostgresOptions options = engine_->options({&second});
+  options.append_wait = std::chrono::seconds(6);
+  log_ = open_and_lead(options);
+  ASSERT_NE(log_, nullptr);
+  const SceneKey scene = create("a", 1);
+  append(scene, 2);
+  second.stop(SIGKILL);
+  std::thread restarter([this] {
+    std::this_thread::sleep_for(std::chrono::seconds(1));
+    engine_->restart(SIGKILL);
+  });
+  EXPECT_EQ(append_records(*log_, scene, 7, 1).code(), absl::StatusCode::kUnavailable);
+  restarter.join();
+  EXPECT_EQ(engine_->query("SELECT last FROM locus.scene_log"), "3") << "a plain read shows what no standby has";
+  second.start();
+  ASSERT_EQ(append_records(*log_, scene, 7, 2), absl::OkStatus());
+  expect_records(scene, 1, 4);
+}
+
 TEST_F(PostgresLogFaultTest, AnEngineThatMayLoseAcknowledgedRecordsIsRefused) {
   const auto refusal_with = [&](const std::string& setting, const std::string& value, EngineReplication replication) {
     sql(absl::StrCat("ALTER SYSTEM SET ", setting, " = '", value, "'"));

@@ -8,8 +8,8 @@
 // PostgreSQL would end its wait for the standbys and report the commit as if they had it.
 //
 // Threads: one thread at a time.
-#ifndef LOCUS_SERVER_STORAGE_POSTGRES_CONNECTION_H_
-#define LOCUS_SERVER_STORAGE_POSTGRES_CONNECTION_H_
+#ifndef LOCUS_SERVER_STORAGE_POSTGRES_ENGINE_CONNECTION_H_
+#define LOCUS_SERVER_STORAGE_POSTGRES_ENGINE_CONNECTION_H_
 
 #include <libpq-fe.h>
 
@@ -23,16 +23,16 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 #include "server/storage/postgres/engine_address.h"
-#include "server/storage/postgres/parameters.h"
+#include "server/storage/postgres/sql_parameters.h"
 
 namespace locus::server {
 
 using Deadline = std::chrono::steady_clock::time_point;
 
-// Rows that a statement returned. All columns are bigint, text or bytea, in binary format.
-class Rows {
+// EngineRows that a statement returned. All columns are bigint, text or bytea, in binary format.
+class EngineRows {
  public:
-  explicit Rows(PGresult* result) : result_(result, &PQclear) {}
+  explicit EngineRows(PGresult* result) : result_(result, &PQclear) {}
 
   size_t size() const { return static_cast<size_t>(PQntuples(result_.get())); }
   bool empty() const { return size() == 0; }
@@ -50,11 +50,12 @@ class Rows {
   std::unique_ptr<PGresult, decltype(&PQclear)> result_;
 };
 
-class Connection {
+class EngineConnection {
  public:
   // Connects. UNAVAILABLE if the host does not answer until `deadline`, refuses the user, or does not accept writes;
   // the message names the host.
-  static absl::StatusOr<std::unique_ptr<Connection>> open(const EngineAddress& address, size_t host, Deadline deadline);
+  static absl::StatusOr<std::unique_ptr<EngineConnection>> open(const EngineAddress& address, size_t host,
+                                                                Deadline deadline);
 
   size_t host() const { return host_; }
 
@@ -63,8 +64,8 @@ class Connection {
 
   // Add a statement to the next run(): its text, or the name of a prepared statement. `parameters` may be dropped when
   // the call returns.
-  void add(const char* sql, const Parameters& parameters = {});
-  void add_prepared(const char* name, const Parameters& parameters);
+  void add(const char* sql, const SqlParameters& parameters = {});
+  void add_prepared(const char* name, const SqlParameters& parameters);
   // Sends the added statements and waits for all results. Unless BEGIN is one of them, or was one of an earlier run,
   // the statements are one transaction, committed when this call returns OK. Errors: RESOURCE_EXHAUSTED if the engine's
   // disk or memory is full, DATA_LOSS if the engine found its data damaged, UNAVAILABLE otherwise.
@@ -75,13 +76,13 @@ class Connection {
     return run(deadline);
   }
   // Returns the results of the last run() that succeeded, one for each statement.
-  const std::vector<Rows>& results() const { return results_; }
+  const std::vector<EngineRows>& results() const { return results_; }
 
   // Runs one statement and calls `sink` with each row as it arrives, so that memory is needed for one row only.
   // `patience` is the longest wait for the next row. An error of `sink` is returned, and the connection is no longer
   // usable.
-  absl::Status stream(const char* sql, const Parameters& parameters, std::chrono::milliseconds patience,
-                      absl::FunctionRef<absl::Status(const Rows&)> sink);
+  absl::Status stream(const char* sql, const SqlParameters& parameters, std::chrono::milliseconds patience,
+                      absl::FunctionRef<absl::Status(const EngineRows&)> sink);
 
   // Returns whether the outcome of the last run() is unknown; the connection is then no longer usable.
   bool lost() const { return lost_; }
@@ -109,7 +110,7 @@ class Connection {
     void operator()(PGconn* connection) const { PQfinish(connection); }
   };
 
-  Connection(PGconn* connection, size_t host, std::string name)
+  EngineConnection(PGconn* connection, size_t host, std::string name)
       : connection_(connection), host_(host), name_(std::move(name)) {}
   static void notice(void* connection, const PGresult* result);
 
@@ -128,7 +129,7 @@ class Connection {
   size_t added_ = 0;        // statements added since the last run()
   absl::Status add_error_;  // error of the first statement that could not be added
   std::string warning_;     // first warning of the engine during the current run(); empty if there was none
-  std::vector<Rows> results_;
+  std::vector<EngineRows> results_;
   Deadline check_at_ = {};
   bool lost_ = false;
   bool broken_ = false;
@@ -136,4 +137,4 @@ class Connection {
 
 }  // namespace locus::server
 
-#endif  // LOCUS_SERVER_STORAGE_POSTGRES_CONNECTION_H_
+#endif  // LOCUS_SERVER_STORAGE_POSTGRES_ENGINE_CONNECTION_H_

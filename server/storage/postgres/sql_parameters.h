@@ -1,8 +1,8 @@
 // Parameters of an SQL statement in PostgreSQL's binary format: big-endian integers of 64 bits, texts, bytes, and
 // arrays of integers and of bytes. Texts and bytes are borrowed: they must outlive the statement's sending. Unsigned
 // numbers are stored as the signed number of the same bits. One thread at a time.
-#ifndef LOCUS_SERVER_STORAGE_POSTGRES_PARAMETERS_H_
-#define LOCUS_SERVER_STORAGE_POSTGRES_PARAMETERS_H_
+#ifndef LOCUS_SERVER_STORAGE_POSTGRES_SQL_PARAMETERS_H_
+#define LOCUS_SERVER_STORAGE_POSTGRES_SQL_PARAMETERS_H_
 
 #include <cstdint>
 #include <deque>
@@ -15,29 +15,29 @@
 
 namespace locus::server {
 
-class Parameters {
+class SqlParameters {
  public:
-  Parameters() = default;
-  Parameters(Parameters&&) = default;
-  Parameters(const Parameters&) = delete;  // the pointers of a copy would point into the original
-  Parameters& operator=(const Parameters&) = delete;
+  SqlParameters() = default;
+  SqlParameters(SqlParameters&&) = default;
+  SqlParameters(const SqlParameters&) = delete;  // the pointers of a copy would point into the original
+  SqlParameters& operator=(const SqlParameters&) = delete;
 
-  Parameters& number(uint64_t value) { return own(RowWriter().big_u64(value).take()); }
-  Parameters& text(absl::string_view value) { return bytes(value); }
-  Parameters& bytes(absl::string_view value) {
+  SqlParameters& number(uint64_t value) { return own(RowWriter().big_u64(value).take()); }
+  SqlParameters& text(absl::string_view value) { return bytes(value); }
+  SqlParameters& bytes(absl::string_view value) {
     // A null pointer would be SQL's NULL.
     values_.push_back(value.data() == nullptr ? "" : value.data());
     lengths_.push_back(static_cast<int>(value.size()));
     formats_.push_back(1);
     return *this;
   }
-  Parameters& numbers(absl::Span<const uint64_t> values) {
+  SqlParameters& numbers(absl::Span<const uint64_t> values) {
     RowWriter out = array_head(kBigint, values.size());
     for (const uint64_t value : values) out.big_u32(sizeof(value)).big_u64(value);
     return own(out.take());
   }
   // Copies the values, because an array is one parameter.
-  Parameters& list_of_bytes(absl::Span<const absl::string_view> values) {
+  SqlParameters& list_of_bytes(absl::Span<const absl::string_view> values) {
     RowWriter out = array_head(kBytea, values.size());
     for (const absl::string_view value : values) out.big_u32(static_cast<uint32_t>(value.size())).bytes(value);
     return own(out.take());
@@ -59,7 +59,7 @@ class Parameters {
     if (size > 0) out.big_u32(static_cast<uint32_t>(size)).big_u32(1);  // length and first index of the dimension
     return out;
   }
-  Parameters& own(std::string value) {
+  SqlParameters& own(std::string value) {
     owned_.push_back(std::move(value));
     return bytes(owned_.back());
   }
@@ -72,4 +72,4 @@ class Parameters {
 
 }  // namespace locus::server
 
-#endif  // LOCUS_SERVER_STORAGE_POSTGRES_PARAMETERS_H_
+#endif  // LOCUS_SERVER_STORAGE_POSTGRES_SQL_PARAMETERS_H_

@@ -1,13 +1,14 @@
-#include "server/storage/postgres/connection_pool.h"
+#include "server/storage/postgres/engine_pool.h"
 
 #include <algorithm>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "core/base/planted_bug.h"
 
 namespace locus::server {
 
-absl::StatusOr<ConnectionPool::Lease> ConnectionPool::acquire(Use use, Deadline deadline) {
+absl::StatusOr<EnginePool::Lease> EnginePool::acquire(Use use, Deadline deadline) {
   {
     MutexLock lock(mutex_);
     while (in_use(use) >= kConnections) {
@@ -16,12 +17,12 @@ absl::StatusOr<ConnectionPool::Lease> ConnectionPool::acquire(Use use, Deadline 
     }
     ++in_use(use);
     if (!idle_.empty()) {
-      std::unique_ptr<Connection> connection = std::move(idle_.back());
+      std::unique_ptr<EngineConnection> connection = std::move(idle_.back());
       idle_.pop_back();
       return Lease(*this, use, std::move(connection));
     }
   }
-  absl::StatusOr<std::unique_ptr<Connection>> connection = connect(deadline);
+  absl::StatusOr<std::unique_ptr<EngineConnection>> connection = connect(deadline);
   if (connection.ok()) return Lease(*this, use, *std::move(connection));
   MutexLock lock(mutex_);
   --in_use(use);
@@ -29,7 +30,7 @@ absl::StatusOr<ConnectionPool::Lease> ConnectionPool::acquire(Use use, Deadline 
   return connection.status();
 }
 
-absl::StatusOr<std::unique_ptr<Connection>> ConnectionPool::connect(Deadline deadline) {
+absl::StatusOr<std::unique_ptr<EngineConnection>> EnginePool::connect(Deadline deadline) {
   size_t first = 0;
   {
     MutexLock lock(mutex_);
@@ -39,7 +40,7 @@ absl::StatusOr<std::unique_ptr<Connection>> ConnectionPool::connect(Deadline dea
   for (size_t tried = 0; tried < address_.host_count(); ++tried) {
     const size_t host = (first + tried) % address_.host_count();
     const Deadline until = std::min(deadline, std::chrono::steady_clock::now() + connect_wait_);
-    absl::StatusOr<std::unique_ptr<Connection>> connection = Connection::open(address_, host, until);
+    absl::StatusOr<std::unique_ptr<EngineConnection>> connection = EngineConnection::open(address_, host, until);
     absl::Status status = connection.status();
     if (status.ok()) status = prepare_(**connection, until);
     if (absl::IsFailedPrecondition(status)) return status;
@@ -54,11 +55,11 @@ absl::StatusOr<std::unique_ptr<Connection>> ConnectionPool::connect(Deadline dea
   return absl::UnavailableError(absl::StrCat("no host of the engine accepts writes: ", absl::StrJoin(reasons, "; ")));
 }
 
-void ConnectionPool::give_back(Use use, std::unique_ptr<Connection> connection) {
-  std::vector<std::unique_ptr<Connection>> closed;  // closed without the lock
+void EnginePool::give_back(Use use, std::unique_ptr<EngineConnection> connection) {
+  std::vector<std::unique_ptr<EngineConnection>> closed;  // closed without the lock
   MutexLock lock(mutex_);
   --in_use(use);
-  if (connection->lost() && connection->host() == host_) {
+  if (connection->lost() && connection->host() == host_ && !planted(PlantedBug::kEngineHostKept)) {
     host_ = (host_ + 1) % address_.host_count();
     closed.swap(idle_);
   }
@@ -70,7 +71,7 @@ void ConnectionPool::give_back(Use use, std::unique_ptr<Connection> connection) 
   returned_.notify_all();
 }
 
-std::string ConnectionPool::host_name() const {
+std::string EnginePool::host_name() const {
   MutexLock lock(mutex_);
   return address_.host_name(host_);
 }

@@ -5,8 +5,8 @@
 //
 // Threads: any thread. acquire() waits for a free connection, or for a host to accept one; no lock is held while
 // connecting. Invariant: at most kConnections connections are in use for each purpose, and as many are idle at most.
-#ifndef LOCUS_SERVER_STORAGE_POSTGRES_CONNECTION_POOL_H_
-#define LOCUS_SERVER_STORAGE_POSTGRES_CONNECTION_POOL_H_
+#ifndef LOCUS_SERVER_STORAGE_POSTGRES_ENGINE_POOL_H_
+#define LOCUS_SERVER_STORAGE_POSTGRES_ENGINE_POOL_H_
 
 #include <array>
 #include <functional>
@@ -16,38 +16,38 @@
 
 #include "absl/status/statusor.h"
 #include "core/base/mutex.h"
-#include "server/storage/postgres/connection.h"
+#include "server/storage/postgres/engine_connection.h"
 
 namespace locus::server {
 
-class ConnectionPool {
+class EnginePool {
  public:
   // Function that checks and prepares each new connection before its first use.
-  using Prepare = std::function<absl::Status(Connection&, Deadline)>;
+  using Prepare = std::function<absl::Status(EngineConnection&, Deadline)>;
 
   enum class Use : uint8_t { kAppend, kOther };
   static constexpr size_t kConnections = 2;
 
-  ConnectionPool(EngineAddress address, std::chrono::milliseconds connect_wait, Prepare prepare)
+  EnginePool(EngineAddress address, std::chrono::milliseconds connect_wait, Prepare prepare)
       : address_(std::move(address)), connect_wait_(connect_wait), prepare_(std::move(prepare)) {}
 
   // Right to use a connection. The destructor returns the connection to the pool, or closes it if it is not usable.
   class Lease {
    public:
-    Lease(ConnectionPool& pool, Use use, std::unique_ptr<Connection> connection)
+    Lease(EnginePool& pool, Use use, std::unique_ptr<EngineConnection> connection)
         : pool_(&pool), use_(use), connection_(std::move(connection)) {}
     Lease(Lease&& other) noexcept = default;
     Lease& operator=(Lease&&) = delete;
     ~Lease() {
       if (connection_ != nullptr) pool_->give_back(use_, std::move(connection_));
     }
-    Connection& operator*() const { return *connection_; }
-    Connection* operator->() const { return connection_.get(); }
+    EngineConnection& operator*() const { return *connection_; }
+    EngineConnection* operator->() const { return connection_.get(); }
 
    private:
-    ConnectionPool* pool_;
+    EnginePool* pool_;
     Use use_;
-    std::unique_ptr<Connection> connection_;
+    std::unique_ptr<EngineConnection> connection_;
   };
 
   // Returns a connection. Tries each host once, for at most `connect_wait` each. UNAVAILABLE with the reason of each
@@ -59,8 +59,8 @@ class ConnectionPool {
   std::string host_name() const LOCUS_EXCLUDES(mutex_);
 
  private:
-  absl::StatusOr<std::unique_ptr<Connection>> connect(Deadline deadline) LOCUS_EXCLUDES(mutex_);
-  void give_back(Use use, std::unique_ptr<Connection> connection) LOCUS_EXCLUDES(mutex_);
+  absl::StatusOr<std::unique_ptr<EngineConnection>> connect(Deadline deadline) LOCUS_EXCLUDES(mutex_);
+  void give_back(Use use, std::unique_ptr<EngineConnection> connection) LOCUS_EXCLUDES(mutex_);
   size_t& in_use(Use use) LOCUS_REQUIRES(mutex_) { return in_use_[static_cast<size_t>(use)]; }
 
   const EngineAddress address_;
@@ -72,9 +72,9 @@ class ConnectionPool {
   // Connections for each use that callers have, or that are being opened.
   std::array<size_t, 2> in_use_ LOCUS_GUARDED_BY(mutex_) = {};
   size_t host_ LOCUS_GUARDED_BY(mutex_) = 0;  // host to try first
-  std::vector<std::unique_ptr<Connection>> idle_ LOCUS_GUARDED_BY(mutex_);
+  std::vector<std::unique_ptr<EngineConnection>> idle_ LOCUS_GUARDED_BY(mutex_);
 };
 
 }  // namespace locus::server
 
-#endif  // LOCUS_SERVER_STORAGE_POSTGRES_CONNECTION_POOL_H_
+#endif  // LOCUS_SERVER_STORAGE_POSTGRES_ENGINE_POOL_H_
