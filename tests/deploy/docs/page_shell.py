@@ -5,7 +5,6 @@ import os
 import selectors
 import shutil
 import signal
-import socket
 import subprocess
 import tempfile
 import time
@@ -14,12 +13,6 @@ SHOWN_ADDRESS, SHOWN_HTTP = "127.0.0.1:7575", "127.0.0.1:7576"
 START_SECONDS = 30
 COMMAND_SECONDS = 180
 CCACHE = "/usr/lib/ccache"
-
-
-def free_address():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"127.0.0.1:{probe.getsockname()[1]}"
 
 
 def address_in(port_file):
@@ -34,14 +27,14 @@ class PageShell:
         self.binaries, self.options = binaries, options
         self.folder = tempfile.mkdtemp(prefix="page-")
         self.hidden = tempfile.mkdtemp(prefix="page-run-")
-        # A daemon of the page's own gets ports that are free now; that of the runner chooses its ports itself.
-        self.address, self.http = free_address(), free_address()
+        # A daemon of the page's own listens on a unix socket; that of the runner chooses ports. So runs at once cannot meet.
+        self.address, self.http = f"unix:{self.hidden}/locus.sock", None
         self.environment = {name: value for name, value in os.environ.items() if not name.startswith("LOCUS_")}
         self.environment.update(
             PATH=":".join([binaries, CCACHE, "/usr/bin", "/bin", os.environ["PATH"]]), PYTHONPATH=python,
             PYTHONDONTWRITEBYTECODE="1", HOME=self.hidden, LC_ALL="C.UTF-8")
         if options is None:
-            self.environment.update(LOCUS_LISTEN=self.address, LOCUS_HTTP_LISTEN=self.http)
+            self.environment.update(LOCUS_LISTEN=self.address, LOCUS_HTTP_LISTEN="")
         if prefix:
             self.environment.update(PKG_CONFIG_PATH=os.path.join(prefix, "lib/pkgconfig"), CMAKE_PREFIX_PATH=prefix)
         self.daemon = self.shell = None
@@ -51,7 +44,8 @@ class PageShell:
         try:
             if self.options is not None:
                 self.start_daemon()
-            self.environment.update(LOCUS_ADDRESS=self.address, LOCUS_METRICS_ADDRESS=self.http)
+                self.environment.update(LOCUS_METRICS_ADDRESS=self.http)
+            self.environment.update(LOCUS_ADDRESS=self.address)
             self.shell = subprocess.Popen(["/bin/bash", "--noprofile", "--norc"], cwd=self.folder, env=self.environment,
                                           stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
                                           start_new_session=True)
@@ -118,7 +112,12 @@ class PageShell:
         return path
 
     def addressed(self, text):
-        return text.replace(SHOWN_ADDRESS, self.address).replace(SHOWN_HTTP, self.http)
+        if self.http is None and SHOWN_HTTP in text:
+            raise RuntimeError(f"the locusd that a page starts itself has no HTTP port: {text}")
+        return text.replace(SHOWN_ADDRESS, self.address).replace(SHOWN_HTTP, self.http or SHOWN_HTTP)
+
+    def shown(self, text):
+        return text.replace(self.address, SHOWN_ADDRESS).replace(self.http or SHOWN_HTTP, SHOWN_HTTP)
 
     def run(self, command):
         """Runs one command in the shell; returns its exit code, output and errors, with the addresses that pages show."""
@@ -131,7 +130,7 @@ class PageShell:
         texts = []
         for ending in (".out", ".err"):
             with open(base + ending, encoding="utf-8", errors="replace") as file:
-                texts.append(file.read().replace(self.address, SHOWN_ADDRESS).replace(self.http, SHOWN_HTTP))
+                texts.append(self.shown(file.read()))
         return code, texts[0], texts[1]
 
     def answer(self, command):
