@@ -2,7 +2,6 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
@@ -13,23 +12,11 @@
 #include "absl/strings/string_view.h"
 #include "absl/strings/strip.h"
 #include "core/base/check.h"
+#include "server/config/config_file.h"
 #include "server/config/server_parser.h"
 
 namespace locus::server {
 namespace {
-
-// Returns the numbers of the lines in the file `path` that set the option `name`, as text such as "3" or "3,7"; empty
-// if no line sets the option.
-std::string lines_that_set(const std::string& path, const std::string& name) {
-  std::ifstream file(path);
-  std::string lines;
-  std::string line;
-  for (int number = 1; std::getline(file, line); ++number) {
-    const absl::string_view key = absl::string_view(line).substr(0, line.find('='));
-    if (absl::StripAsciiWhitespace(key) == name) absl::StrAppend(&lines, lines.empty() ? "" : ",", number);
-  }
-  return lines;
-}
 
 // Options that are flags without a value.
 constexpr std::pair<absl::string_view, bool ServerConfig::*> kFlags[] = {

@@ -16,6 +16,7 @@
 #include "core/base/check.h"
 #include "core/base/similar_word.h"
 #include "core/base/status_macros.h"
+#include "server/config/config_file.h"
 #include "server/config/config_origins.h"
 #include "server/config/connection_limits.h"
 #include "server/config/listen_address.h"
@@ -329,7 +330,17 @@ void parse_all(const std::vector<std::string>& arguments, const Environment& env
   CLI::App app;
   build_parser(app, config);
   add_maintenance(app, invocation.maintenance);
-  parse(app, with_environment(arguments, environment));
+  const std::vector<std::string> all = with_environment(arguments, environment);
+  try {
+    parse(app, all);
+  } catch (const CLI::Success&) {
+    throw;
+  } catch (const CLI::ExtrasError&) {
+    throw;
+  } catch (const CLI::Error& error) {
+    invocation = mistake(with_line_of_file(app, all, error));
+    return;
+  }
   const bool show_config = invocation.maintenance && invocation.maintenance->task == Maintenance::Task::kShowConfig;
   if (invocation.maintenance && !show_config) {
     std::string& directory = invocation.maintenance->directory;

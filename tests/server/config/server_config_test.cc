@@ -8,6 +8,7 @@
 #include <fstream>
 #include <map>
 
+#include "absl/strings/str_cat.h"
 #include "server/config/machine.h"
 
 namespace locus::server {
@@ -138,6 +139,32 @@ TEST_F(ServerConfigTest, MistakesEndWithTwoAndNameTheOption) {
     EXPECT_THAT(invocation.text, HasSubstr(named));
     EXPECT_THAT(invocation.text, HasSubstr("--help"));
   }
+}
+
+TEST_F(ServerConfigTest, MistakesInTheFileNameItsLine) {
+  const std::vector<std::pair<std::string, std::string>> cases = {
+      {"max-scenes = 2\nthread = 1\n", ":2: there is no option `thread` of the file; did you mean `threads`?"},
+      {"# one\n\nnonsense\nthread = 1\n", ":3: there is no option `nonsense` of the file"},
+      {"listen = [127.0.0.1:1,\n 127.0.0.1:2]\nno-such-option = 1\n", ":3: there is no option `no-such-option`"},
+      {"threads = 1\n[more]\nmax-scenes = 2\n", ":2: there is no option `[more]`"},
+      {"more.threads = 1\n", ":1: there is no option `more.threads`"},
+      {"help = true\n", ":1: there is no option `help`"},
+      {"max-streams = 1\n\nmax-scenes = 0\n", ":3: --max-scenes: "},
+      {"threads = many\n", ":1: --threads: "}};
+  for (const auto& [text, message] : cases) {
+    write_file(text);
+    const Invocation invocation = read({"--config", file_});
+    EXPECT_EQ(invocation.exit_code, 2) << text;
+    EXPECT_THAT(invocation.text, HasSubstr(absl::StrCat("locusd: ", file_, message))) << text;
+  }
+}
+
+TEST_F(ServerConfigTest, AMistakeInAFlagOrVariableIsNotBlamedOnTheFile) {
+  write_file("threads = 1\n");
+  EXPECT_THAT(read({"--config", file_, "--threads", "many"}).text, HasSubstr("locusd: --threads: "));
+  EXPECT_THAT(read({"--config", file_, "--max-scenes", "0"}).text, HasSubstr("locusd: --max-scenes: "));
+  environment_ = {{"LOCUS_CONFIG", file_}, {"LOCUS_THREADS", "many"}};
+  EXPECT_THAT(read({}).text, HasSubstr("locusd: --threads: "));
 }
 
 TEST_F(ServerConfigTest, NonLocalAddressesNeedTlsAndAnAccessFileOrInsecure) {
