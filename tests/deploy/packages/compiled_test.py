@@ -13,15 +13,13 @@ import glob
 import os
 import re
 import shutil
-import subprocess
-import time
 import unittest
 
 import debian_root
+import packaged_programs
 
 PICTURES = {"whole": [], "street": ["--eye", "-20,-70,12", "--look-at", "10,0,6", "--fov", "60"],
             "plan": ["--dir", "0,0,-1", "--ortho", "0", "--cull", "none"]}
-START_SECONDS = 30
 EXACT = ("-ffp-contract=off", "-fno-tree-slp-vectorize", "-O3", "-DNDEBUG")
 HARDENED = ("-D_FORTIFY_SOURCE=2", "-fstack-protector-strong", "-Werror=format-security")
 
@@ -33,35 +31,13 @@ def pack(name, **environment):
     return os.path.join(clone, "build/package")
 
 
-@contextlib.contextmanager
-def daemon(program, folder):
-    """Runs a daemon on a free port of loopback and returns its address."""
-    port_file = os.path.join(folder, "port")
-    process = subprocess.Popen([program, "--listen", "127.0.0.1:0", "--http-listen", "", "--port-file", port_file],
-                               stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    try:
-        deadline = time.monotonic() + START_SECONDS
-        while not os.path.exists(port_file):
-            if process.poll() is not None or time.monotonic() > deadline:
-                raise RuntimeError(f"{program} did not start")
-            time.sleep(0.05)
-        with open(port_file, encoding="utf-8") as file:
-            yield "127.0.0.1:" + file.read().strip()
-    finally:
-        process.terminate()
-        process.wait(timeout=60)
-
-
 class CompiledTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         shutil.rmtree(OPTIONS.work, ignore_errors=True)
         cls.first = pack("one/clone")
         cls.second = pack("another/clone/elsewhere", CCACHE_DISABLE="1", TZ="Asia/Tokyo")
-        cls.programs = os.path.join(OPTIONS.work, "unpacked")
-        for name in ("locusd", "locus"):
-            (path,) = debian_root.newest(cls.first, name)
-            debian_root.run("dpkg-deb", "--extract", path, cls.programs)
+        cls.programs = packaged_programs.unpack(cls.first, os.path.join(OPTIONS.work, "unpacked"))
 
     @classmethod
     def tearDownClass(cls):
@@ -86,15 +62,17 @@ class CompiledTest(unittest.TestCase):
                 self.assertIn(" " + flag + " ", command)
             self.assertLess(command.rindex(" -O2 "), command.rindex(" -O3 "))
 
+    def test_packaged_programs_draw_the_golden_pictures(self):
+        self.assertEqual(packaged_programs.golden_differences(OPTIONS.source, self.programs, OPTIONS.work), (9, []))
+
     def test_packaged_programs_answer_and_draw_as_those_of_the_build(self):
-        packaged = os.path.join(self.programs, "usr/bin")
         pictures = {}
         with contextlib.ExitStack() as stack:
             addresses = {}
-            for name, folder in (("packaged", packaged), ("built", os.path.join(OPTIONS.build, "bin"))):
+            for name, folder in (("packaged", self.programs), ("built", os.path.join(OPTIONS.build, "bin"))):
                 place = os.path.join(OPTIONS.work, name)
                 os.makedirs(place)
-                addresses[name] = stack.enter_context(daemon(os.path.join(folder, "locusd"), place))
+                addresses[name] = stack.enter_context(packaged_programs.daemon(folder, place))
                 locus = [os.path.join(folder, "locus"), "-a", addresses[name]]
                 debian_root.run(*locus, "generate", "city", "--triangles", "30000", "--seed", "3", "--scene", "city", "--create")
                 for picture, options in PICTURES.items():
@@ -102,7 +80,7 @@ class CompiledTest(unittest.TestCase):
                     debian_root.run(*locus, "render", "city", path, *options)
                     with open(path, "rb") as file:
                         pictures[name, picture] = file.read()
-            shown = debian_root.run(os.path.join(packaged, "locus"), "-a", addresses["packaged"], "demo", "--seconds", "3",
+            shown = debian_root.run(os.path.join(self.programs, "locus"), "-a", addresses["packaged"], "demo", "--seconds", "3",
                                     "--compare", addresses["built"])
         for picture in PICTURES:
             self.assertGreater(len(pictures["packaged", picture]), 10000)
