@@ -52,10 +52,21 @@ class CompiledTest(unittest.TestCase):
             if not filecmp.cmp(one, other, shallow=False):
                 self.fail(debian_root.run("diffoscope", one, other, check=False, timeout=1800))
 
+    def commands(self, folder):
+        """Returns the command lines of the compiler for the sources in a folder."""
+        with open(os.path.join(self.first, "compile_commands.json"), encoding="utf-8") as file:
+            return [line for line in file if '"command"' in line and folder in line]
+
+    def test_code_that_parses_what_clients_and_files_contain_has_protected_buffers(self):
+        for folder, count in (("/core/scene/log/", 5), ("/server/", 20), ("/client/", 20), ("/proto/", 1)):
+            commands = self.commands(folder)
+            self.assertGreaterEqual(len(commands), count, folder)
+            for command in commands:
+                self.assertGreater(command.rfind(" -fstack-protector-strong "), command.rfind(" -fno-stack-protector "), command)
+                self.assertGreater(command.rfind(" -D_FORTIFY_SOURCE=2 "), command.rfind(" -U_FORTIFY_SOURCE "), command)
+
     def test_flags_that_keep_answers_exact_survive(self):
-        (log,) = glob.glob(os.path.join(OPTIONS.work, "one/clone/build/package/compile_commands.json"))
-        with open(log, encoding="utf-8") as file:
-            commands = [line for line in file if '"command"' in line and "/core/" in line]
+        commands = self.commands("/core/")
         self.assertGreater(len(commands), 20)
         for command in commands:
             for flag in EXACT + HARDENED:
