@@ -2,14 +2,13 @@
 
     python3 compiled_test.py --source DIR --build DIR --work DIR
 
-Each packing compiles everything, without ccache. The packages must equal those that are packed from the build, which
-tests/run.sh has made.
+Each packing compiles everything, without ccache, and groups sources as the build does. The packages must equal those that
+are packed from the build, which tests/run.sh has made.
 """
 
 import argparse
 import contextlib
 import filecmp
-import glob
 import os
 import re
 import shutil
@@ -25,10 +24,17 @@ EXACT = ("-ffp-contract=off", "-fno-tree-slp-vectorize", "-O3", "-DNDEBUG")
 HARDENED = ("-D_FORTIFY_SOURCE=2", "-fstack-protector-strong", "-Werror=format-security")
 
 
+def cache_of_the_build():
+    with open(os.path.join(OPTIONS.build, "CMakeCache.txt"), encoding="utf-8") as file:
+        return file.read()
+
+
 def pack(name, **environment):
     clone = os.path.join(OPTIONS.work, name)
     debian_root.copy_sources(OPTIONS.source, clone)
-    debian_root.run(os.path.join(clone, "deploy/package.sh"), timeout=5400, env=dict(os.environ, **environment))
+    unity = "OFF" if "LOCUS_UNITY:BOOL=OFF" in cache_of_the_build() else "ON"
+    debian_root.run(os.path.join(clone, "deploy/package.sh"), timeout=5400,
+                    env=dict(os.environ, LOCUS_UNITY=unity, **environment))
     return os.path.join(clone, "build/package")
 
 
@@ -54,8 +60,8 @@ class CompiledTest(unittest.TestCase):
     def test_two_builds_are_equal(self):
         self.check_equal_to_the_first(self.second)
 
+    # So what other tests show with programs of the build, such as results and speed, holds for compiled packages.
     def test_packages_packed_from_the_build_are_equal(self):
-        """What other tests show with programs of the build, such as its results and speed, holds for compiled packages."""
         folder = os.path.join(OPTIONS.work, "from-build")
         debian_root.run(os.path.join(OPTIONS.source, "deploy/package.sh"), "--from", OPTIONS.build, "--out", folder)
         self.check_equal_to_the_first(folder)
