@@ -94,6 +94,13 @@ class PackagesTest(unittest.TestCase):
         with open(os.path.join(self.trees["locusd"], "DEBIAN/conffiles"), encoding="utf-8") as file:
             self.assertEqual(sorted(file.read().split()), ["/etc/default/locusd", "/etc/locus/locusd.conf"])
 
+    def test_packages_that_a_build_installs_are_build_dependencies(self):
+        with open(os.path.join(OPTIONS.source, "deploy/debian/control"), encoding="utf-8") as file:
+            (field,) = re.findall(r"^Build-Depends:((?:.*\n )*.*)", file.read(), re.MULTILINE)
+        depends = {word.split()[0] for word in field.split(",")}
+        installed = set(run(os.path.join(OPTIONS.source, "deploy/packages.sh"), "--list", "build", "python").split())
+        self.assertEqual(installed - depends - {"g++"}, set())
+
     def test_programs_need_libraries_only(self):
         for package in PROGRAMS:
             depends = re.split(r", | \| ", self.field(package, "Depends"))
