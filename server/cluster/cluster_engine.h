@@ -11,7 +11,7 @@
 // that its implementation sets. Errors of all functions: UNAVAILABLE if the engine does not answer; then the outcome is
 // unknown: the statement may have taken effect, may still take effect later, or never. Other errors are named at each
 // function; after them nothing has changed. All that is returned is committed: an implementation on PostgreSQL reads
-// rows of scenes with locking reads, because after a restart a plain read can show a commit that no standby has.
+// in transactions that lock a row, because after a restart a plain read can show a commit that no standby has.
 #ifndef LOCUS_SERVER_CLUSTER_CLUSTER_ENGINE_H_
 #define LOCUS_SERVER_CLUSTER_CLUSTER_ENGINE_H_
 
@@ -26,7 +26,7 @@
 namespace locus::server {
 
 using MemberId = uint64_t;  // random, from 1 to kMaxMemberId; 0: no member
-using Token = uint64_t;     // number of the leaderships that a scene has had; 0: it never had a leader
+using Token = uint64_t;     // increases with each leadership of a scene; 0: it never had a leader
 
 inline constexpr MemberId kMaxMemberId = (uint64_t{1} << 63) - 1;  // largest value of a signed column
 // Load of a member that takes no scenes because it drains.

@@ -45,8 +45,8 @@ absl::StatusOr<EnginePool::Lease> PostgresCluster::acquire() const {
 }
 
 absl::Status PostgresCluster::run(EngineConnection& connection) const {
-  const absl::Status status = connection.run(answer_deadline());
-  return status.ok() ? status : absl::UnavailableError(status.message());
+  absl::Status status = run_checked(connection, options_.replication, answer_deadline());
+  return status.ok() || absl::IsFailedPrecondition(status) ? status : absl::UnavailableError(status.message());
 }
 
 absl::Status PostgresCluster::join(MemberId id, const MemberInfo& info, uint64_t load) {
@@ -164,39 +164,30 @@ absl::StatusOr<LeaderRow> PostgresCluster::hand_over(SceneKey scene, Token token
 absl::StatusOr<LeaderRow> PostgresCluster::change_leader(SceneKey scene, Token token, std::optional<MemberId> from,
                                                          MemberId to) const {
   ASSIGN_OR_RETURN(const EnginePool::Lease lease, acquire());
-  EngineConnection& connection = *lease;
-  // The lock of the scene's row orders this change with appends and other changes; that of the member's row keeps the
-  // member from being marked dead until the commit.
-  connection.add("BEGIN");
-  connection.add(LOCUS_LEADER_ROWS "WHERE l.scene = $1::bigint FOR UPDATE OF l", SqlParameters().number(scene));
-  connection.add("SELECT id FROM locus.member WHERE id = $1::bigint AND dead = 0 FOR UPDATE",
-                 SqlParameters().number(to));
-  RETURN_IF_ERROR(run(connection));
-  const std::vector<EngineRows>& results = connection.results();
-  absl::Status refusal;
-  LeaderRow row;
-  if (results[1].empty()) {
-    refusal = absl::NotFoundError(absl::StrCat("the engine has no scene ", scene));
-  } else {
-    row = leader_row(results[1], 0);
-    if (row.token != token || (from && row.leader != *from)) {
-      refusal = absl::AbortedError(absl::StrCat("scene ", scene, " has another leader: its token is ", row.token));
-    } else if (to != 0 && results[2].empty()) {
-      refusal = absl::FailedPreconditionError(absl::StrCat("member ", to, " is not living"));
-    }
-  }
-  if (refusal.ok()) {
-    row.leader = to;
-    row.token = token + 1;
-    connection.add("UPDATE locus.scene_log SET leader = $2::bigint, token = $3::bigint WHERE scene = $1::bigint",
-                   SqlParameters().number(scene).number(row.leader).number(row.token));
-    connection.add("UPDATE locus.member SET assigned = assigned + 1 WHERE id = $1::bigint", SqlParameters().number(to));
-  }
-  add_barrier(connection);
-  connection.add("COMMIT");
-  RETURN_IF_ERROR(run(connection));
-  RETURN_IF_ERROR(refusal);
-  return row;
+  // One round trip, so that no lock waits for this daemon. The lock of the member's row keeps it from being marked dead
+  // until the commit; it is taken first by each change of a leader.
+  lease->add("SELECT id FROM locus.member WHERE id = $1::bigint AND dead = 0 FOR NO KEY UPDATE",
+             SqlParameters().number(to));
+  lease->add(
+      "WITH led AS (UPDATE locus.scene_log SET leader = $3::bigint, token = token + 1"
+      " WHERE scene = $1::bigint AND token = $2::bigint AND ($5::bigint = 0 OR leader = $4::bigint)"
+      " AND ($3::bigint = 0 OR EXISTS (SELECT FROM locus.member WHERE id = $3::bigint AND dead = 0))"
+      " RETURNING scene, leader, token, last),"
+      " counted AS (UPDATE locus.member SET assigned = assigned + 1"
+      " WHERE id = $3::bigint AND EXISTS (SELECT FROM led))"
+      " SELECT l.scene, l.leader, l.token, l.last, s.epoch FROM led l JOIN locus.scene s ON s.key = l.scene",
+      SqlParameters().number(scene).number(token).number(to).number(from.value_or(0)).number(from ? 1 : 0));
+  lease->add(LOCUS_LEADER_ROWS "WHERE l.scene = $1::bigint", SqlParameters().number(scene));
+  add_barrier(*lease);
+  RETURN_IF_ERROR(run(*lease));
+  const EngineRows& changed = lease->results()[1];
+  if (!changed.empty()) return leader_row(changed, 0);
+  const EngineRows& present = lease->results()[2];
+  if (present.empty()) return absl::NotFoundError(absl::StrCat("the engine has no scene ", scene));
+  const LeaderRow row = leader_row(present, 0);
+  if (row.token != token || (from && row.leader != *from))
+    return absl::AbortedError(absl::StrCat("scene ", scene, " has another leader: its token is ", row.token));
+  return absl::FailedPreconditionError(absl::StrCat("member ", to, " is not living"));
 }
 
 }  // namespace locus::server

@@ -1,10 +1,10 @@
 // ClusterEngine on the replicated PostgreSQL in which PostgresLog stores the scenes. The table `member` has the
 // members; `scene_log` has leader and token of each scene, which PostgresLog names in each append.
 //
-// Threads: any thread may call any member. Calls wait for the engine, at most for PostgresOptions::answer_wait after a
-// connection is there. At most two connections are open, so that beats never wait for the bytes of scenes. In addition
-// to the errors of ClusterEngine, each call returns UNAVAILABLE for every failure of the engine, and
-// FAILED_PRECONDITION if the engine acknowledges before a second machine has synced.
+// Threads: any thread may call any member. Calls wait for the engine, at most for PostgresOptions::answer_wait for a
+// connection and as long for its answer. At most two connections are open, so that beats never wait for the bytes of
+// scenes. In addition to the errors of ClusterEngine, each call returns UNAVAILABLE for every failure of the engine,
+// and FAILED_PRECONDITION if the engine acknowledges before a second machine has synced.
 #ifndef LOCUS_SERVER_STORAGE_POSTGRES_CLUSTER_H_
 #define LOCUS_SERVER_STORAGE_POSTGRES_CLUSTER_H_
 

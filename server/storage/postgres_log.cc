@@ -83,19 +83,20 @@ absl::StatusOr<EnginePool::Lease> PostgresLog::begin_read() const {
   while (true) {
     ASSIGN_OR_RETURN(EnginePool::Lease lease, acquire(EnginePool::Use::kOther, deadline));
     add_barrier(*lease);
-    absl::Status status = lease->run(std::min(deadline, answer_deadline()));
+    absl::Status status = run_checked(*lease, options_.replication, std::min(deadline, answer_deadline()));
     if (status.ok()) status = lease->run("BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY", answer_deadline());
     if (status.ok()) return lease;
     if (!lease->lost() || std::chrono::steady_clock::now() + kBackoff >= deadline) return status;
   }
 }
 
-void PostgresLog::lead(const StoredScene& scene, uint64_t token, uint64_t chain) {
+void PostgresLog::lead(const StoredScene& scene, uint64_t member, uint64_t token, uint64_t chain) {
   auto state = std::make_shared<Led>();
   state->key = scene.key;
   state->name = scene.name;
   {
     MutexLock writing(state->writing);
+    state->member = member;
     state->token = token;
     state->epoch = scene.epoch;
     state->last = scene.last_sequence;
@@ -164,8 +165,11 @@ void PostgresLog::commit_group(absl::Span<Append* const> group) const {
     if (left.empty()) return;
     const bool again = status.ok() || absl::IsUnavailable(status);
     if (!again || std::chrono::steady_clock::now() + kBackoff >= deadline) {
-      for (Append* const append : left)
+      for (Append* const append : left) {
         append->failure = status.ok() ? absl::UnavailableError("the engine did not answer in time") : status;
+        // A statement that waits in a network or in a stopped server may still arrive.
+        if (append->sent) append->outcome = Append::Outcome::kUnknown;
+      }
       return;
     }
     if (!status.ok()) std::this_thread::sleep_for(kBackoff);
@@ -177,20 +181,16 @@ absl::Status PostgresLog::send_appends(absl::Span<Append* const> appends, Deadli
   {
     ASSIGN_OR_RETURN(const EnginePool::Lease lease, acquire(EnginePool::Use::kAppend, deadline));
     for (const Append* const append : appends) lease->add_prepared(kAppendName, append_parameters(*append));
-    // An operator may switch synchronous replication off at any time, which the engine does not report.
-    const bool check = lease->due_for_check();
-    if (check) add_engine_settings(*lease);
-    absl::Status status = lease->run(std::min(deadline, answer_deadline()));
+    uint64_t bytes = 0;
+    for (const Append* const append : appends) bytes += append->bytes;
+    const absl::Status status = run_checked(*lease, options_.replication, std::min(deadline, answer_deadline(bytes)));
     if (!status.ok() && !lease->lost()) return status;
-    if (status.ok() && check) {
-      status = check_engine_settings(lease->results().back(), options_.replication);
-      if (!status.ok()) lease->drop();  // the next connection is refused with the same reason
-    }
     for (size_t i = 0; i < appends.size(); ++i) {
       if (status.ok() && lease->results()[i].changed() == appends[i]->entries.size()) {
         appends[i]->outcome = Append::Outcome::kWritten;
       } else {
         appends[i]->outcome = Append::Outcome::kUnknown;
+        appends[i]->sent = appends[i]->sent || !status.ok();
         open.push_back(appends[i]);
       }
     }
@@ -217,7 +217,8 @@ absl::Status PostgresLog::resolve(absl::Span<Append* const> appends, Deadline de
                    .c_str(),
                SqlParameters().numbers(keys));
     if (!plain) add_barrier(*lease);
-    if (absl::Status status = lease->run(std::min(deadline, answer_deadline())); !status.ok()) {
+    if (absl::Status status = run_checked(*lease, options_.replication, std::min(deadline, answer_deadline()));
+        !status.ok()) {
       if (std::chrono::steady_clock::now() + kBackoff >= deadline) return status;
       std::this_thread::sleep_for(kBackoff);
       continue;
@@ -247,31 +248,48 @@ absl::Status PostgresLog::resolve(absl::Span<Append* const> appends, Deadline de
 }
 
 absl::Status PostgresLog::remove_possibly_written(Led& led) {
-  const uint64_t key = led.key, token = led.token, last = led.last, chain = led.chain, possible = led.possibly_last;
+  const uint64_t key = led.key, token = led.token, last = led.last, chain = led.chain;
   // The new token refuses statements of the failed append that arrive only now.
   const auto remove = [&](EngineConnection& connection) -> absl::Status {
     connection.add(
         "UPDATE locus.scene_log SET token = token + 1, last = $3::bigint, chain = $4::bigint"
-        " WHERE scene = $1::bigint AND token = $2::bigint AND last IN ($3::bigint, $5::bigint)",
-        SqlParameters().number(key).number(token).number(last).number(chain).number(possible));
+        " WHERE scene = $1::bigint AND token = $2::bigint AND last >= $3::bigint",
+        SqlParameters().number(key).number(token).number(last).number(chain));
+    RETURN_IF_ERROR(connection.run(answer_deadline()));
+    if (connection.results()[0].changed() != 1) return refuse_fenced(led.name);
     connection.add("DELETE FROM locus.record WHERE scene = $1::bigint AND sequence > $2::bigint",
                    SqlParameters().number(key).number(last));
-    RETURN_IF_ERROR(connection.run(answer_deadline()));
-    return connection.results()[0].changed() == 1 ? absl::OkStatus() : refuse_fenced(led.name);
+    return connection.run(change_deadline());
   };
-  const absl::Status status = transact(remove, [&](EngineConnection& connection) -> absl::StatusOr<bool> {
+  const auto removed = [&](EngineConnection& connection) -> absl::StatusOr<bool> {
     connection.add("SELECT leader, token FROM locus.scene_log WHERE scene = $1::bigint FOR UPDATE",
                    SqlParameters().number(key));
-    add_barrier(connection);
-    RETURN_IF_ERROR(connection.run(answer_deadline()));
+    RETURN_IF_ERROR(run_barrier(connection));
     const EngineRows& found = connection.results()[0];
-    return !found.empty() && found.number(0, 0) == options_.member && found.number(0, 1) == token + 1;
-  });
-  if (absl::IsAborted(status)) led.fenced = true;
+    return !found.empty() && found.number(0, 0) == led.member && found.number(0, 1) == token + 1;
+  };
+  absl::Status status = transact(EnginePool::Use::kAppend, remove, removed);
+  if (absl::IsAborted(status)) {  // an earlier call may have removed them, and its answer was lost
+    ASSIGN_OR_RETURN(const EnginePool::Lease lease, acquire(EnginePool::Use::kAppend, change_deadline()));
+    ASSIGN_OR_RETURN(const bool earlier, removed(*lease));
+    led.fenced = !earlier;
+    if (earlier) status = absl::OkStatus();
+  }
   RETURN_IF_ERROR(status);
   led.possibly_last = 0;
   led.token = token + 1;
   return absl::OkStatus();
+}
+
+absl::Status PostgresLog::run_barrier(EngineConnection& connection) const {
+  add_barrier(connection);
+  return run_checked(connection, options_.replication, answer_deadline());
+}
+
+absl::StatusOr<uint64_t> PostgresLog::token_of(SceneKey scene) const {
+  ASSIGN_OR_RETURN(const LedPtr state, led(scene));
+  MutexLock writing(state->writing);
+  return state->token;
 }
 
 absl::StatusOr<uint64_t> PostgresLog::latest(SceneKey scene) const {

@@ -4,14 +4,14 @@
 // tables.
 //
 // An acknowledged append is synced by the engine's quorum, whatever its AckLevel. If the connection is lost during an
-// append, nothing is reported until another connection has found out whether it was written, for at most `append_wait`;
+// append, nothing is reported until another connection has found out whether it was written, for about `append_wait`;
 // after that the append fails as UNAVAILABLE, and the scene's next append removes it if it was written after all.
 //
 // In addition to the errors of UpdateLog, members that change a scene return ABORTED if another daemon leads the scene.
 //
 // Threads: any thread may call any member, but append() for a scene only from one thread at a time. There is no thread
-// of its own. Members wait for the engine: at most `append_wait` if it is away, longer only while a snapshot or mesh is
-// sent and the engine makes progress. At most four connections are open.
+// of its own. Members wait for the engine: a few times `append_wait` at most if it is away, and longer only while a
+// snapshot or mesh is sent and the engine makes progress. At most four connections are open.
 #ifndef LOCUS_SERVER_STORAGE_POSTGRES_LOG_H_
 #define LOCUS_SERVER_STORAGE_POSTGRES_LOG_H_
 
@@ -65,9 +65,12 @@ class PostgresLog final : public UpdateLog {
   // its acknowledged records can then be read, and no other daemon can append. ABORTED if another daemon was faster. A
   // call that fails as UNAVAILABLE may be repeated with the same token.
   absl::StatusOr<StoredScene> take_over(SceneKey scene, uint64_t token) LOCUS_EXCLUDES(mutex_);
-  // Begins to append as the leader that the engine already has: this daemon, with the token `token`. ABORTED if leader
-  // or token differ.
-  absl::StatusOr<StoredScene> begin_leading(SceneKey scene, uint64_t token) LOCUS_EXCLUDES(mutex_);
+  // Begins to append as the leader that the engine already has: `member`, with the token `token`. ABORTED if leader or
+  // token differ.
+  absl::StatusOr<StoredScene> begin_leading(SceneKey scene, uint64_t member, uint64_t token) LOCUS_EXCLUDES(mutex_);
+  // Returns the token with which this daemon appends. It is higher than that of the takeover if the outcome of an
+  // append was unknown and its records had to be removed.
+  absl::StatusOr<uint64_t> token_of(SceneKey scene) const LOCUS_EXCLUDES(mutex_);
 
   const std::vector<StoredScene>& stored_scenes() const override { return stored_scenes_; }
   const std::vector<StoredMesh>& stored_meshes() const override { return stored_meshes_; }
@@ -108,6 +111,7 @@ class PostgresLog final : public UpdateLog {
     SceneKey key = 0;
     std::string name;
     Mutex writing;  // held during a whole append or change of the scene's row
+    uint64_t member LOCUS_GUARDED_BY(writing) = 0;
     uint64_t token LOCUS_GUARDED_BY(writing) = 0;
     uint64_t epoch LOCUS_GUARDED_BY(writing) = 0;
     uint64_t last LOCUS_GUARDED_BY(writing) = 0;   // sequence number of the last record
@@ -127,22 +131,28 @@ class PostgresLog final : public UpdateLog {
   absl::Status list_stored();
 
   absl::StatusOr<LedPtr> led(SceneKey scene) const LOCUS_EXCLUDES(mutex_);
-  void lead(const StoredScene& scene, uint64_t token, uint64_t chain) LOCUS_EXCLUDES(mutex_);
+  void lead(const StoredScene& scene, uint64_t member, uint64_t token, uint64_t chain) LOCUS_EXCLUDES(mutex_);
 
   // Returns a connection; tries again while the engine is away, until the deadline.
   absl::StatusOr<EnginePool::Lease> acquire(EnginePool::Use use, Deadline deadline) const;
   // Returns a connection in a transaction that reads one state of all tables. Tries hosts until one has committed a
   // barrier, so that the state is not older than this call.
   absl::StatusOr<EnginePool::Lease> begin_read() const;
-  Deadline answer_deadline() const { return std::chrono::steady_clock::now() + options_.answer_wait; }
+  // Returns the deadline of one answer; sending `bytes` may take a second for each 8 MiB in addition.
+  Deadline answer_deadline(uint64_t bytes = 0) const {
+    return std::chrono::steady_clock::now() + options_.answer_wait + std::chrono::milliseconds(bytes >> 13);
+  }
   Deadline change_deadline() const { return std::chrono::steady_clock::now() + options_.append_wait; }
 
-  // Runs `change` in a transaction and commits it. If the outcome of the commit is unknown, asks `was_done` on other
-  // connections until one has answered; UNAVAILABLE if none has answered until the deadline.
-  absl::Status transact(Change change, WasDone was_done) const;
-  // Locks the row of the scene's log in the open transaction and checks that this daemon leads the scene: ABORTED
-  // otherwise.
-  absl::Status guard(EngineConnection& connection, Led& led) const LOCUS_REQUIRES(led.writing);
+  // Runs the added statements and a barrier, and checks the engine's settings.
+  absl::Status run_barrier(EngineConnection& connection) const;
+  // Runs `change` in a transaction and commits it. An error of `change` is returned only after a barrier, because an
+  // isolated or restarted primary may show what is not, or no longer, true. If the outcome of the commit is unknown,
+  // asks `was_done` on other connections until one has answered; UNAVAILABLE if none has answered until the deadline.
+  absl::Status transact(EnginePool::Use use, Change change, WasDone was_done) const;
+  // Locks the row of the scene's log in the open transaction and checks that this daemon leads the scene. Otherwise
+  // returns ABORTED and sets `fenced`, which holds if transact() returns ABORTED, too.
+  absl::Status guard(EngineConnection& connection, Led& led, bool& fenced) const LOCUS_REQUIRES(led.writing);
   absl::Status send_row(EngineConnection& connection, const StoredSceneRow& row) const;
   // Changes the row of a scene that this daemon leads.
   absl::Status change_row(SceneKey scene, absl::FunctionRef<void(StoredSceneRow&)> change) LOCUS_EXCLUDES(mutex_);

@@ -66,26 +66,29 @@ absl::Status PostgresLog::list_stored() {
   return absl::OkStatus();
 }
 
-absl::Status PostgresLog::transact(Change change, WasDone was_done) const {
+absl::Status PostgresLog::transact(EnginePool::Use use, Change change, WasDone was_done) const {
   const Deadline deadline = change_deadline();
   absl::Status status;
   while (true) {
-    ASSIGN_OR_RETURN(const EnginePool::Lease lease, acquire(EnginePool::Use::kOther, deadline));
+    ASSIGN_OR_RETURN(const EnginePool::Lease lease, acquire(use, deadline));
     // A connection that was idle may have been closed by the engine, which shows only now.
     status = lease->run("BEGIN", std::min(deadline, answer_deadline()));
     if (!status.ok() && std::chrono::steady_clock::now() + kBetweenAttempts < deadline) continue;
     if (status.ok()) status = change(*lease);
     if (!status.ok()) {
-      if (lease->in_transaction()) lease->run("ROLLBACK", answer_deadline()).IgnoreError();
-      return status;
+      if (!lease->in_transaction()) return status;
+      lease->add("ROLLBACK");
+      const absl::Status confirmed = run_barrier(*lease);
+      return confirmed.ok() ? status : absl::UnavailableError(confirmed.message());
     }
-    status = lease->run("COMMIT", answer_deadline());
+    lease->add("COMMIT");
+    status = run_checked(*lease, options_.replication, answer_deadline());
     if (!lease->lost()) return status;
     break;
   }
   while (std::chrono::steady_clock::now() + kBetweenAttempts < deadline) {
     std::this_thread::sleep_for(kBetweenAttempts);
-    absl::StatusOr<EnginePool::Lease> lease = acquire(EnginePool::Use::kOther, deadline);
+    absl::StatusOr<EnginePool::Lease> lease = acquire(use, deadline);
     if (!lease.ok()) break;
     const absl::StatusOr<bool> done = was_done(**lease);
     if (!done.ok()) continue;
@@ -95,15 +98,14 @@ absl::Status PostgresLog::transact(Change change, WasDone was_done) const {
   return absl::UnavailableError(absl::StrCat("the engine may or may not have stored the change: ", status.message()));
 }
 
-absl::Status PostgresLog::guard(EngineConnection& connection, Led& led) const {
+absl::Status PostgresLog::guard(EngineConnection& connection, Led& led, bool& fenced) const {
   connection.add("SELECT token FROM locus.scene_log WHERE scene = $1::bigint FOR UPDATE",
                  SqlParameters().number(led.key));
   RETURN_IF_ERROR(connection.run(answer_deadline()));
   const EngineRows& found = connection.results()[0];
   if (found.empty()) return scene_not_stored(led.key);
-  if (found.number(0, 0) == led.token && !led.fenced) return absl::OkStatus();
-  led.fenced = true;
-  return refuse_fenced(led.name);
+  fenced = led.fenced || found.number(0, 0) != led.token;
+  return fenced ? refuse_fenced(led.name) : absl::OkStatus();
 }
 
 absl::StatusOr<PostgresLog::Leader> PostgresLog::leader_of(SceneKey scene) const {
@@ -132,22 +134,21 @@ absl::StatusOr<StoredScene> PostgresLog::take_over(SceneKey scene, uint64_t toke
   const auto taken = [&](EngineConnection& connection) -> absl::StatusOr<bool> {
     connection.add("SELECT leader, token FROM locus.scene_log WHERE scene = $1::bigint FOR UPDATE",
                    SqlParameters().number(scene));
-    add_barrier(connection);
-    RETURN_IF_ERROR(connection.run(answer_deadline()));
+    RETURN_IF_ERROR(run_barrier(connection));
     const EngineRows& found = connection.results()[0];
     return !found.empty() && found.number(0, 0) == options_.member && found.number(0, 1) == token + 1;
   };
-  absl::Status status = transact(take, taken);
+  absl::Status status = transact(EnginePool::Use::kOther, take, taken);
   if (absl::IsAborted(status)) {
     ASSIGN_OR_RETURN(const EnginePool::Lease lease, acquire(EnginePool::Use::kOther, change_deadline()));
     ASSIGN_OR_RETURN(const bool was_taken, taken(*lease));
     if (was_taken) status = absl::OkStatus();
   }
   RETURN_IF_ERROR(status);
-  return begin_leading(scene, token + 1);
+  return begin_leading(scene, options_.member, token + 1);
 }
 
-absl::StatusOr<StoredScene> PostgresLog::begin_leading(SceneKey scene, uint64_t token) {
+absl::StatusOr<StoredScene> PostgresLog::begin_leading(SceneKey scene, uint64_t member, uint64_t token) {
   ASSIGN_OR_RETURN(const EnginePool::Lease lease, begin_read());
   lease->add(LOCUS_STORED_SCENES "WHERE s.key = $1::bigint", SqlParameters().number(scene));
   lease->add("COMMIT");
@@ -155,16 +156,15 @@ absl::StatusOr<StoredScene> PostgresLog::begin_leading(SceneKey scene, uint64_t 
   const EngineRows& found = lease->results()[0];
   if (found.empty()) return scene_not_stored(scene);
   StoredScene stored = stored_scene(found, 0);
-  if (found.number(0, kSceneColumns + 3) != options_.member || found.number(0, kSceneColumns + 4) != token)
+  if (found.number(0, kSceneColumns + 3) != member || found.number(0, kSceneColumns + 4) != token)
     return refuse_fenced(stored.name);
-  lead(stored, token, found.number(0, kSceneColumns + 2));
+  lead(stored, member, token, found.number(0, kSceneColumns + 2));
   return stored;
 }
 
 absl::StatusOr<ChunkList> PostgresLog::send_chunks(EngineConnection& connection, const char* sql, uint64_t owner,
                                                    uint64_t id, ChunkSource source) const {
   ChunkList list;
-  std::vector<std::string> unsent;  // the parameters borrow the bytes of a chunk until it is sent
   uint64_t bytes = 0;
   while (true) {
     ASSIGN_OR_RETURN(std::optional<std::string> chunk, source());
@@ -259,21 +259,21 @@ absl::StatusOr<SceneKey> PostgresLog::create_scene(absl::string_view name, absl:
     RETURN_IF_ERROR(connection.run("BEGIN", answer_deadline()));
     ASSIGN_OR_RETURN(const std::optional<SceneKey> added, add_name(connection));
     if (added) {  // the name was free, so the scene had not been stored
-      RETURN_IF_ERROR(connection.run("ROLLBACK", answer_deadline()));
+      connection.add("ROLLBACK");
+      RETURN_IF_ERROR(run_barrier(connection));
       return false;
     }
     connection.add("SELECT key FROM locus.scene WHERE key = $1::bigint", SqlParameters().number(row.key));
-    add_barrier(connection);
     connection.add("COMMIT");
-    RETURN_IF_ERROR(connection.run(answer_deadline()));
+    RETURN_IF_ERROR(run_barrier(connection));
     return !connection.results()[0].empty();
   };
-  RETURN_IF_ERROR(transact(create, was_done));
+  RETURN_IF_ERROR(transact(EnginePool::Use::kOther, create, was_done));
   StoredScene stored;
   stored.key = row.key;
   stored.name = row.name;
   stored.epoch = epoch;
-  lead(stored, 1, row.snapshot_chain);
+  lead(stored, options_.member, 1, row.snapshot_chain);
   return row.key;
 }
 
@@ -281,19 +281,21 @@ absl::Status PostgresLog::delete_scene(SceneKey key) {
   ASSIGN_OR_RETURN(const LedPtr state, led(key));
   Led& scene = *state;
   MutexLock writing(scene.writing);
+  bool fenced = false;
   const auto remove = [&](EngineConnection& connection) LOCUS_REQUIRES(scene.writing) -> absl::Status {
-    RETURN_IF_ERROR(guard(connection, scene));
+    RETURN_IF_ERROR(guard(connection, scene, fenced));
     connection.add("DELETE FROM locus.record WHERE scene = $1::bigint", SqlParameters().number(key));
     connection.add("DELETE FROM locus.snapshot_chunk WHERE scene = $1::bigint", SqlParameters().number(key));
     connection.add("DELETE FROM locus.scene WHERE key = $1::bigint", SqlParameters().number(key));
     return connection.run(change_deadline());
   };
-  absl::Status status = transact(remove, [&](EngineConnection& connection) -> absl::StatusOr<bool> {
+  const auto removed = [&](EngineConnection& connection) -> absl::StatusOr<bool> {
     connection.add("SELECT key FROM locus.scene WHERE key = $1::bigint FOR UPDATE", SqlParameters().number(key));
-    add_barrier(connection);
-    RETURN_IF_ERROR(connection.run(answer_deadline()));
+    RETURN_IF_ERROR(run_barrier(connection));
     return connection.results()[0].empty();
-  });
+  };
+  absl::Status status = transact(EnginePool::Use::kAppend, remove, removed);
+  if (absl::IsAborted(status)) scene.fenced = fenced;
   if (!status.ok() && !absl::IsNotFound(status)) return status;
   MutexLock lock(mutex_);
   led_.erase(key);
@@ -305,8 +307,9 @@ absl::Status PostgresLog::change_row(SceneKey key, absl::FunctionRef<void(Stored
   Led& scene = *state;
   MutexLock writing(scene.writing);
   StoredSceneRow row;
+  bool fenced = false;
   const auto update = [&](EngineConnection& connection) LOCUS_REQUIRES(scene.writing) -> absl::Status {
-    RETURN_IF_ERROR(guard(connection, scene));
+    RETURN_IF_ERROR(guard(connection, scene, fenced));
     connection.add("SELECT " LOCUS_SCENE_COLUMNS " FROM locus.scene s WHERE s.key = $1::bigint FOR UPDATE",
                    SqlParameters().number(key));
     RETURN_IF_ERROR(connection.run(answer_deadline()));
@@ -316,12 +319,13 @@ absl::Status PostgresLog::change_row(SceneKey key, absl::FunctionRef<void(Stored
   };
   const auto was_done = [&](EngineConnection& connection) -> absl::StatusOr<bool> {
     connection.add("SELECT checksum FROM locus.scene WHERE key = $1::bigint FOR UPDATE", SqlParameters().number(key));
-    add_barrier(connection);
-    RETURN_IF_ERROR(connection.run(answer_deadline()));
+    RETURN_IF_ERROR(run_barrier(connection));
     const EngineRows& found = connection.results()[0];
     return !found.empty() && found.number(0, 0) == checksum_of(row);
   };
-  RETURN_IF_ERROR(transact(update, was_done));
+  const absl::Status status = transact(EnginePool::Use::kAppend, update, was_done);
+  if (absl::IsAborted(status)) scene.fenced = fenced;
+  RETURN_IF_ERROR(status);
   scene.epoch = row.epoch;
   return absl::OkStatus();
 }
@@ -338,48 +342,59 @@ absl::Status PostgresLog::write_snapshot(SceneKey key, uint64_t sequence, ChunkS
   ASSIGN_OR_RETURN(const LedPtr led_scene, led(key));
   Led& scene = *led_scene;
   const uint64_t id = random_id();
+  bool fenced = false;
   const auto write = [&](EngineConnection& connection) -> absl::Status {
     connection.add("SELECT " LOCUS_SCENE_COLUMNS " FROM locus.scene s WHERE s.key = $1::bigint",
                    SqlParameters().number(key));
     RETURN_IF_ERROR(connection.run(answer_deadline()));
     if (connection.results()[0].empty()) return scene_not_stored(key);
-    ASSIGN_OR_RETURN(StoredSceneRow row, scene_row(connection.results()[0], 0));
-    if (sequence < row.snapshot_sequence || sequence > scene.known_last)
-      return refuse_snapshot_at(sequence, row.snapshot_sequence, scene.known_last);
-    const uint64_t replaced = row.snapshot;
-    ASSIGN_OR_RETURN(row.chunks, send_chunks(connection, kSnapshotChunkSql, key, id, state));
-    // Appends wait from here on.
+    ASSIGN_OR_RETURN(const StoredSceneRow before, scene_row(connection.results()[0], 0));
+    if (sequence < before.snapshot_sequence || sequence > scene.known_last)
+      return refuse_snapshot_at(sequence, before.snapshot_sequence, scene.known_last);
+    ASSIGN_OR_RETURN(const ChunkList chunks, send_chunks(connection, kSnapshotChunkSql, key, id, state));
+    // From here on appends and other changes of the scene wait. The row is read again, because they did not wait
+    // before.
     MutexLock writing(scene.writing);
-    RETURN_IF_ERROR(guard(connection, scene));
-    connection.add(
-        "SELECT s.snapshot, r.chain FROM locus.scene s LEFT JOIN locus.record r ON r.scene = s.key"
-        " AND r.sequence = $2::bigint WHERE s.key = $1::bigint",
-        SqlParameters().number(key).number(sequence));
+    RETURN_IF_ERROR(guard(connection, scene, fenced));
+    connection.add("SELECT " LOCUS_SCENE_COLUMNS
+                   ", r.chain FROM locus.scene s LEFT JOIN locus.record r ON r.scene = s.key"
+                   " AND r.sequence = $2::bigint WHERE s.key = $1::bigint",
+                   SqlParameters().number(key).number(sequence));
     RETURN_IF_ERROR(connection.run(answer_deadline()));
     const EngineRows& found = connection.results()[0];
     if (found.empty()) return scene_not_stored(key);
-    if (found.number(0, 0) != replaced)
+    ASSIGN_OR_RETURN(StoredSceneRow row, scene_row(found, 0));
+    if (row.snapshot != before.snapshot)
       return absl::AbortedError(
           absl::StrCat("another snapshot of scene '", row.name, "' was written at the same time"));
     if (sequence != row.snapshot_sequence) {
-      if (found.is_null(0, 1)) return damaged("scene", row.name, absl::StrCat("record ", sequence, " is missing"));
-      row.snapshot_chain = found.number(0, 1);
+      if (found.is_null(0, kSceneColumns))
+        return damaged("scene", row.name, absl::StrCat("record ", sequence, " is missing"));
+      row.snapshot_chain = found.number(0, kSceneColumns);
     }
     row.snapshot = id;
     row.snapshot_sequence = sequence;
+    row.chunks = chunks;
+    row.apply_version = kApplyVersion;
+    RETURN_IF_ERROR(send_row(connection, row));
     connection.add("DELETE FROM locus.snapshot_chunk WHERE scene = $1::bigint AND snapshot = $2::bigint",
-                   SqlParameters().number(key).number(replaced));
+                   SqlParameters().number(key).number(before.snapshot));
     connection.add("DELETE FROM locus.record WHERE scene = $1::bigint AND sequence <= $2::bigint",
                    SqlParameters().number(key).number(sequence));
-    return send_row(connection, row);
+    return connection.run(change_deadline());
   };
-  return transact(write, [&](EngineConnection& connection) -> absl::StatusOr<bool> {
+  const auto written = [&](EngineConnection& connection) -> absl::StatusOr<bool> {
     connection.add("SELECT snapshot FROM locus.scene WHERE key = $1::bigint FOR UPDATE", SqlParameters().number(key));
-    add_barrier(connection);
-    RETURN_IF_ERROR(connection.run(answer_deadline()));
+    RETURN_IF_ERROR(run_barrier(connection));
     const EngineRows& found = connection.results()[0];
     return !found.empty() && found.number(0, 0) == id;
-  });
+  };
+  absl::Status status = transact(EnginePool::Use::kOther, write, written);
+  if (absl::IsAborted(status) && fenced) {
+    MutexLock writing(scene.writing);
+    scene.fenced = true;
+  }
+  return status;
 }
 
 absl::Status PostgresLog::read_snapshot(SceneKey key, ChunkSink sink) const {

@@ -1,4 +1,5 @@
 // Members of PostgresLog that store and read meshes.
+#include <algorithm>
 #include <utility>
 
 #include "absl/strings/escaping.h"
@@ -42,20 +43,23 @@ absl::Status PostgresLog::add_mesh(absl::string_view name, const Sha256& sha256,
     ASSIGN_OR_RETURN(StoredMeshRow found, mesh_row(connection.results()[0], 0));
     return found;
   };
+  // Locks the content's row, so that equal content is sent by one daemon only and is not deleted meanwhile. Returns the
+  // id of the content's chunks, 0 if they are not stored yet.
+  const auto lock_content = [&](EngineConnection& connection) -> absl::StatusOr<uint64_t> {
+    connection.add(
+        "INSERT INTO locus.mesh_content (sha256, content, chunks, chunk_bytes, digest) VALUES ($1::bytea, 0, 0, 0, 0)"
+        " ON CONFLICT (sha256) DO UPDATE SET sha256 = EXCLUDED.sha256 RETURNING content",
+        SqlParameters().bytes(view_of(sha256)));
+    RETURN_IF_ERROR(connection.run(change_deadline()));
+    return connection.results()[0].number(0, 0);
+  };
   bool stored_before = false;
   const auto add = [&](EngineConnection& connection) -> absl::Status {
     ASSIGN_OR_RETURN(const std::optional<StoredMeshRow> there, find_name(connection));
     if (there && there->sha256 != sha256) return mesh_already_stored(name);
     stored_before = there.has_value();
     if (stored_before) return absl::OkStatus();
-    // Locks the content's row, so that equal content is sent by one daemon only and is not deleted meanwhile. The row
-    // has content 0 until its chunks are stored.
-    connection.add(
-        "INSERT INTO locus.mesh_content (sha256, content, chunks, chunk_bytes, digest) VALUES ($1::bytea, 0, 0, 0, 0)"
-        " ON CONFLICT (sha256) DO UPDATE SET sha256 = EXCLUDED.sha256 RETURNING content",
-        SqlParameters().bytes(view_of(sha256)));
-    RETURN_IF_ERROR(connection.run(change_deadline()));
-    const uint64_t stored = connection.results()[0].number(0, 0);
+    ASSIGN_OR_RETURN(const uint64_t stored, lock_content(connection));
     if (stored == 0 || was_damaged) {
       const uint64_t id = random_id();
       ASSIGN_OR_RETURN(const ChunkList list, send_chunks(connection, kMeshChunkSql, 0, id, content));
@@ -83,15 +87,16 @@ absl::Status PostgresLog::add_mesh(absl::string_view name, const Sha256& sha256,
                ? absl::OkStatus()
                : absl::UnavailableError(absl::StrCat("mesh '", name, "' was added by another daemon at the same time"));
   };
+  // Waits for a transaction that adds this content and is not committed, by taking the lock of the content's row.
   const auto was_done = [&](EngineConnection& connection) -> absl::StatusOr<bool> {
     RETURN_IF_ERROR(connection.run("BEGIN", answer_deadline()));
+    RETURN_IF_ERROR(lock_content(connection).status());
     ASSIGN_OR_RETURN(const std::optional<StoredMeshRow> found, find_name(connection));
-    add_barrier(connection);
-    connection.add("COMMIT");
-    RETURN_IF_ERROR(connection.run(answer_deadline()));
+    connection.add("ROLLBACK");
+    RETURN_IF_ERROR(run_barrier(connection));
     return found && found->sha256 == sha256;
   };
-  RETURN_IF_ERROR(transact(add, was_done));
+  RETURN_IF_ERROR(transact(EnginePool::Use::kOther, add, was_done));
   if (was_damaged && !stored_before) {
     MutexLock lock(mutex_);
     damaged_contents_.erase(sha256);
@@ -122,15 +127,17 @@ absl::Status PostgresLog::delete_mesh(absl::string_view name) {
     connection.add("DELETE FROM locus.mesh_chunk WHERE content = $1::bigint", SqlParameters().number(content));
     return connection.run(change_deadline());
   };
-  return transact(remove, [&](EngineConnection& connection) -> absl::StatusOr<bool> {
+  return transact(EnginePool::Use::kOther, remove, [&](EngineConnection& connection) -> absl::StatusOr<bool> {
     connection.add("SELECT name FROM locus.mesh WHERE name = $1::text FOR UPDATE", SqlParameters().text(name));
-    add_barrier(connection);
-    RETURN_IF_ERROR(connection.run(answer_deadline()));
+    RETURN_IF_ERROR(run_barrier(connection));
     return connection.results()[0].empty();
   });
 }
 
-absl::Status PostgresLog::set_mesh_graces(absl::Span<const std::string> names, uint32_t grace_s) {
+absl::Status PostgresLog::set_mesh_graces(absl::Span<const std::string> unordered, uint32_t grace_s) {
+  // In one order, so that two daemons that set equal names do not wait for each other.
+  std::vector<std::string> names(unordered.begin(), unordered.end());
+  std::sort(names.begin(), names.end());
   const auto set = [&](EngineConnection& connection) -> absl::Status {
     for (const std::string& name : names) {
       connection.add("SELECT " LOCUS_MESH_COLUMNS " FROM locus.mesh m WHERE m.name = $1::text FOR UPDATE",
@@ -145,12 +152,11 @@ absl::Status PostgresLog::set_mesh_graces(absl::Span<const std::string> names, u
     }
     return absl::OkStatus();
   };
-  return transact(set, [&](EngineConnection& connection) -> absl::StatusOr<bool> {
+  return transact(EnginePool::Use::kOther, set, [&](EngineConnection& connection) -> absl::StatusOr<bool> {
     bool all = true;
     for (const std::string& name : names) {
       connection.add("SELECT grace_s FROM locus.mesh WHERE name = $1::text FOR UPDATE", SqlParameters().text(name));
-      add_barrier(connection);
-      RETURN_IF_ERROR(connection.run(answer_deadline()));
+      RETURN_IF_ERROR(run_barrier(connection));
       const EngineRows& found = connection.results()[0];
       all = all && !found.empty() && found.number(0, 0) == grace_s;
     }

@@ -48,6 +48,15 @@ class ClusterEngineJudge : public ::testing::TestWithParam<std::function<std::un
     return keys;
   }
   SceneKey add_scene() { return tested_->add_scene(); }
+  // Returns the token of a scene that one of these members leads; 0 if none does.
+  server::Token token_of(SceneKey scene) {
+    for (const server::MemberId id : {10, 20, 30, 40}) {
+      const absl::StatusOr<std::vector<server::LeaderRow>> rows = engine().scenes_led_by(id);
+      for (const server::LeaderRow& row : rows.value())
+        if (row.key == scene) return row.token;
+    }
+    return 0;
+  }
 
  private:
   const std::unique_ptr<EngineUnderTest> tested_ = GetParam()();
@@ -186,6 +195,7 @@ TEST_P(ClusterEngineJudge, RacingTakeoversWinEachTokenOnce) {
   uint64_t assigned = 0;
   for (const server::MemberId id : {10, 20, 30, 40}) assigned += beat(id).assigned;
   EXPECT_EQ(wins, assigned);
+  EXPECT_EQ(token_of(scene), wins) << "each success raises the token by one";
   EXPECT_LE(wins, kTokens);
   EXPECT_GE(wins, 1u);
 }

@@ -1,7 +1,7 @@
 // A PostgreSQL server of its own for a test, in a temporary folder and on a Unix socket, so that no port is taken. The
 // destructor ends it. PostgreSQL refuses to run as root, so root runs it as the user `postgres`.
 //
-// Threads: one at a time.
+// Threads: one at a time. The thread that starts a server must outlive it: the kernel ends the server with that thread.
 #ifndef LOCUS_TESTS_SUPPORT_POSTGRES_SERVER_H_
 #define LOCUS_TESTS_SUPPORT_POSTGRES_SERVER_H_
 
@@ -12,6 +12,8 @@
 
 #include <chrono>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <memory>
 #include <string>
 #include <thread>
@@ -69,7 +71,7 @@ class PostgresServer {
       if (query("SELECT 1") == "1") return;
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
-    ADD_FAILURE() << "PostgreSQL does not start: " << folder_.file("log");
+    ADD_FAILURE() << "PostgreSQL does not start: " << log();
   }
   // Ends the server: SIGQUIT without a checkpoint, SIGKILL as the kernel would. Its sessions end with it.
   void stop(int signal) {
@@ -85,6 +87,12 @@ class PostgresServer {
     start();
   }
   const std::string& socket_folder() const { return folder_.path(); }
+
+  // Returns what the server has logged since its last start.
+  std::string log() const {
+    std::ifstream file(folder_.file("log"));
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
 
   // Runs one SQL statement as the superuser and returns the first value, or the error.
   std::string query(const std::string& sql) const {

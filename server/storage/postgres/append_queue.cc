@@ -19,6 +19,7 @@ void AppendQueue::run(Append& append) {
       if (append.done) return;
       group = take_group();  // may lack `append`, if earlier appends fill the group
       ++committing_;
+      if (!waiting_.empty() && committing_ < committers_) waiting_.front()->changed.notify_one();
     }
     commit_(group);
     MutexLock lock(mutex_);

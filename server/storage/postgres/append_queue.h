@@ -32,6 +32,7 @@ struct Append {
   enum class Outcome : uint8_t { kNotWritten, kWritten, kFenced, kUnknown };
   Outcome outcome = Outcome::kNotWritten;
   absl::Status failure;  // reason of kNotWritten and kUnknown
+  bool sent = false;     // it was sent on a connection that was lost, and may still arrive there
 
  private:
   friend class AppendQueue;

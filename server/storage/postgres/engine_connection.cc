@@ -28,6 +28,11 @@ absl::string_view message_of(const char* message) {
   return absl::StripTrailingAsciiWhitespace(message == nullptr ? "" : message);
 }
 
+bool is_read_only(const PGresult* result) {
+  const char* const state = PQresultErrorField(result, PG_DIAG_SQLSTATE);
+  return state != nullptr && absl::string_view(state) == "25006";
+}
+
 }  // namespace
 
 uint64_t EngineRows::changed() const {
@@ -64,9 +69,9 @@ absl::StatusOr<std::unique_ptr<EngineConnection>> EngineConnection::open(const E
 }
 
 void EngineConnection::notice(void* connection, const PGresult* result) {
-  const char* const severity = PQresultErrorField(result, PG_DIAG_SEVERITY_NONLOCALIZED);
+  const char* const function = PQresultErrorField(result, PG_DIAG_SOURCE_FUNCTION);
   std::string& warning = static_cast<EngineConnection*>(connection)->warning_;
-  if (severity != nullptr && absl::string_view(severity) == "WARNING" && warning.empty())
+  if (function != nullptr && absl::string_view(function) == "SyncRepWaitForLSN")
     warning = std::string(message_of(PQresultErrorMessage(result)));
 }
 
@@ -88,6 +93,14 @@ void EngineConnection::add_prepared(const char* name, const SqlParameters& param
                                        parameters.lengths(), parameters.formats(), 1);
   if (sent != 1 && add_error_.ok()) add_error_ = absl::UnavailableError(message_of(PQerrorMessage(connection_.get())));
   if (sent == 1) ++added_;
+}
+
+void EngineConnection::end_transaction() {
+  if (PQpipelineSync(connection_.get()) == 1) {
+    ++ends_;
+  } else if (add_error_.ok()) {
+    add_error_ = absl::UnavailableError(message_of(PQerrorMessage(connection_.get())));
+  }
 }
 
 absl::Status EngineConnection::lose(absl::string_view why) {
@@ -144,8 +157,10 @@ absl::Status EngineConnection::error_of(const PGresult* result) const {
 
 absl::Status EngineConnection::run(Deadline deadline) {
   const size_t statements = std::exchange(added_, 0);
+  size_t open = std::exchange(ends_, 0) + 1;  // transactions whose end was not reported yet
   RETURN_IF_ERROR(send(deadline));
   absl::Status failure;
+  bool read_only = false;
   std::vector<EngineRows> results;
   size_t ended = 0;
   while (true) {
@@ -157,14 +172,19 @@ absl::Status EngineConnection::run(Deadline deadline) {
     }
     EngineRows rows(result);
     const ExecStatusType status = PQresultStatus(result);
-    if (status == PGRES_PIPELINE_SYNC) break;
+    if (status == PGRES_PIPELINE_SYNC) {
+      if (--open == 0) break;
+      continue;
+    }
     if (status == PGRES_COMMAND_OK || status == PGRES_TUPLES_OK) {
       results.push_back(std::move(rows));
     } else if (status != PGRES_PIPELINE_ABORTED && failure.ok()) {
       failure = error_of(result);
+      read_only = is_read_only(result);
     }
   }
   if (PQstatus(connection_.get()) != CONNECTION_OK) return lose(PQerrorMessage(connection_.get()));
+  if (read_only) return lose(failure.message());  // this host is a standby now: another one accepts writes
   RETURN_IF_ERROR(failure);
   // The engine warns when it ends its wait for the standbys early. It then reports the commit as if they had it.
   if (!warning_.empty() && !planted(PlantedBug::kWarningIgnored)) return lose(warning_);

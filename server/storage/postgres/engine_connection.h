@@ -66,6 +66,9 @@ class EngineConnection {
   // the call returns.
   void add(const char* sql, const SqlParameters& parameters = {});
   void add_prepared(const char* name, const SqlParameters& parameters);
+  // Ends the transaction of the statements that were added so far; those that are added later are another one, sent
+  // with them.
+  void end_transaction();
   // Sends the added statements and waits for all results. Unless BEGIN is one of them, or was one of an earlier run,
   // the statements are one transaction, committed when this call returns OK. Errors: RESOURCE_EXHAUSTED if the engine's
   // disk or memory is full, DATA_LOSS if the engine found its data damaged, UNAVAILABLE otherwise.
@@ -86,16 +89,8 @@ class EngineConnection {
 
   // Returns whether the outcome of the last run() is unknown; the connection is then no longer usable.
   bool lost() const { return lost_; }
-  // Makes the connection unusable, although no answer is missing.
-  void drop() { broken_ = true; }
-
-  // Returns whether the engine's settings should be checked again, once a second.
-  bool due_for_check() {
-    const Deadline now = std::chrono::steady_clock::now();
-    if (now < check_at_) return false;
-    check_at_ = now + std::chrono::seconds(1);
-    return true;
-  }
+  // Makes the connection unusable, and the outcome of the last run() unknown.
+  absl::Status lose(absl::string_view why);
 
   // Returns whether the connection may be used for another transaction. A connection with an open transaction may not:
   // when it is closed, the engine undoes the transaction.
@@ -120,17 +115,16 @@ class EngineConnection {
   absl::Status send(Deadline deadline);
   // Returns the next result; null at the end of the results of a statement.
   absl::StatusOr<PGresult*> next(Deadline deadline);
-  absl::Status lose(absl::string_view why);
   absl::Status error_of(const PGresult* result) const;
 
   const std::unique_ptr<PGconn, Close> connection_;
   const size_t host_;
   const std::string name_;
   size_t added_ = 0;        // statements added since the last run()
+  size_t ends_ = 0;         // ends of transactions among them
   absl::Status add_error_;  // error of the first statement that could not be added
-  std::string warning_;     // first warning of the engine during the current run(); empty if there was none
+  std::string warning_;     // warning that the wait for the standbys was cancelled during the current run()
   std::vector<EngineRows> results_;
-  Deadline check_at_ = {};
   bool lost_ = false;
   bool broken_ = false;
 };

@@ -5,6 +5,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "core/base/planted_bug.h"
+#include "core/base/status_macros.h"
 
 namespace locus::server {
 
@@ -37,21 +38,26 @@ absl::StatusOr<std::unique_ptr<EngineConnection>> EnginePool::connect(Deadline d
     first = host_;
   }
   std::vector<std::string> reasons;
+  absl::Status refusal;  // of a host that accepts writes but whose settings are wrong; another one may be the primary
   for (size_t tried = 0; tried < address_.host_count(); ++tried) {
     const size_t host = (first + tried) % address_.host_count();
     const Deadline until = std::min(deadline, std::chrono::steady_clock::now() + connect_wait_);
     absl::StatusOr<std::unique_ptr<EngineConnection>> connection = EngineConnection::open(address_, host, until);
     absl::Status status = connection.status();
     if (status.ok()) status = prepare_(**connection, until);
-    if (absl::IsFailedPrecondition(status)) return status;
-    if (!status.ok()) {
-      reasons.emplace_back(status.message());
-      continue;
-    }
+    const bool late = std::chrono::steady_clock::now() >= deadline;
     MutexLock lock(mutex_);
-    host_ = host;
-    return connection;
+    if (status.ok()) {
+      host_ = host;
+      return connection;
+    }
+    // The next call begins after the hosts that have used up the time of this one.
+    if (late) host_ = (host + 1) % address_.host_count();
+    if (absl::IsFailedPrecondition(status)) refusal = status;
+    reasons.emplace_back(status.message());
+    if (late) break;
   }
+  RETURN_IF_ERROR(refusal);
   return absl::UnavailableError(absl::StrCat("no host of the engine accepts writes: ", absl::StrJoin(reasons, "; ")));
 }
 

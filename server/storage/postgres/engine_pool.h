@@ -1,5 +1,5 @@
 // A bounded number of connections to the engine, shared by threads. Appends have connections of their own, so that they
-// never wait for a snapshot that is being sent. All connections go to one host, the last that accepted writes. If a
+// never wait for a snapshot that is being sent. Connections go to the last host that accepted writes. If a
 // connection is lost, later ones try the next hosts first: an isolated old primary still accepts connections, and a
 // client that returns to it would wait for ever.
 //

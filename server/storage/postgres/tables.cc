@@ -45,6 +45,19 @@ constexpr const char* kTables[] = {
     "ALTER TABLE locus.mesh_chunk ALTER COLUMN bytes SET STORAGE EXTERNAL",
 };
 
+// The session sees the warning that a wait for the standbys was cancelled. Locks of a daemon that is gone must not
+// outlive the time in which another one takes over its scenes by much.
+constexpr const char* kSession[] = {
+    "SELECT set_config('synchronous_commit', current_setting('synchronous_commit'), false)",
+    "SET client_min_messages = warning",
+    "SET idle_in_transaction_session_timeout = '10s'",
+    "SET client_connection_check_interval = '1s'",
+    "SET tcp_keepalives_idle = 2",
+    "SET tcp_keepalives_interval = 1",
+    "SET tcp_keepalives_count = 3",
+    "SET tcp_user_timeout = 5000",
+};
+
 constexpr int kAttempts = 5;
 
 absl::Status refuse_engine(absl::string_view why) { return absl::FailedPreconditionError(why); }
@@ -60,7 +73,18 @@ void add_engine_settings(EngineConnection& connection) {
 absl::Status check_engine(EngineConnection& connection, EngineReplication replication, Deadline deadline) {
   add_engine_settings(connection);
   RETURN_IF_ERROR(connection.run(deadline));
-  return check_engine_settings(connection.results()[0], replication);
+  RETURN_IF_ERROR(check_engine_settings(connection.results()[0], replication));
+  for (const char* const setting : kSession) connection.add(setting);
+  return connection.run(deadline);
+}
+
+absl::Status run_checked(EngineConnection& connection, EngineReplication replication, Deadline deadline) {
+  connection.end_transaction();  // the settings are read after the commit
+  add_engine_settings(connection);
+  RETURN_IF_ERROR(connection.run(deadline));
+  absl::Status refusal = check_engine_settings(connection.results().back(), replication);
+  if (!refusal.ok()) connection.lose(refusal.message()).IgnoreError();
+  return refusal;
 }
 
 absl::Status check_engine_settings(const EngineRows& found, EngineReplication replication) {

@@ -23,8 +23,13 @@ void add_engine_settings(EngineConnection& connection);
 // every name.
 absl::Status check_engine_settings(const EngineRows& settings, EngineReplication replication);
 
-// Runs and checks the statement.
+// Runs and checks the statement, then fixes the settings of the session: it keeps synchronous_commit as it is now, and
+// the engine ends its transactions soon after this daemon has died or its machine cannot be reached.
 absl::Status check_engine(EngineConnection& connection, EngineReplication replication, Deadline deadline);
+
+// Runs the added statements and checks the engine's settings again: an operator may change them at any time, which the
+// engine does not report. If they are refused, the connection is lost: the commit may have had no second machine.
+absl::Status run_checked(EngineConnection& connection, EngineReplication replication, Deadline deadline);
 
 // Creates the tables if the database has none. FAILED_PRECONDITION if their format is newer than kTablesFormat.
 absl::Status prepare_tables(EngineConnection& connection, Deadline deadline);

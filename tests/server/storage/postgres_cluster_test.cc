@@ -106,15 +106,15 @@ TEST_F(PostgresClusterTest, ATakeoverByTheClusterFencesTheLogOfTheFormerLeader) 
   EXPECT_EQ(test::append_records(*log_, scene, 7, 1).code(), absl::StatusCode::kAborted);
 
   const auto successor = log_of(20);
-  EXPECT_EQ(successor->begin_leading(scene, 1).status().code(), absl::StatusCode::kAborted) << "an old token";
-  const auto stored = successor->begin_leading(scene, taken->token);
+  EXPECT_EQ(successor->begin_leading(scene, 20, 1).status().code(), absl::StatusCode::kAborted) << "an old token";
+  const auto stored = successor->begin_leading(scene, 20, taken->token);
   ASSERT_TRUE(stored.ok()) << stored.status();
   EXPECT_EQ(stored->last_sequence, 3u);
   EXPECT_EQ(test::append_records(*successor, scene, 7, 2), absl::OkStatus());
-  EXPECT_EQ(log_of(10)->begin_leading(scene, taken->token).status().code(), absl::StatusCode::kAborted)
+  EXPECT_EQ(log_of(10)->begin_leading(scene, 10, taken->token).status().code(), absl::StatusCode::kAborted)
       << "another member leads";
   log_ = log_of(20);
-  ASSERT_TRUE(static_cast<PostgresLog&>(*log_).begin_leading(scene, taken->token).ok());
+  ASSERT_TRUE(static_cast<PostgresLog&>(*log_).begin_leading(scene, 20, taken->token).ok());
   expect_records(scene, 1, 5);
 }
 

@@ -76,6 +76,25 @@ TEST_F(PostgresLogFaultTest, AFormerLeaderCanChangeNothing) {
   EXPECT_EQ(last, 5u);
 }
 
+// A snapshot takes long; what is changed meanwhile must not be overwritten by the row that it read first.
+TEST_F(PostgresLogFaultTest, ASnapshotKeepsASpecificationThatChangedMeanwhile) {
+  const SceneKey scene = create("a", 1);
+  append(scene, 3);
+  const std::vector<std::string> chunks = test::snapshot_chunks(scene, 3);
+  size_t next = 0;
+  const auto state = [&]() -> absl::StatusOr<std::optional<std::string>> {
+    if (next == 1) {
+      EXPECT_EQ(log_->set_scene_spec(scene, "changed meanwhile"), absl::OkStatus());
+    }
+    if (next == chunks.size()) return std::nullopt;
+    return chunks[next++];
+  };
+  ASSERT_EQ(log_->write_snapshot(scene, 3, state), absl::OkStatus());
+  open();
+  EXPECT_EQ(test::find_stored(*log_, "a")->spec, "changed meanwhile");
+  expect_snapshot(scene, 3);
+}
+
 TEST_F(PostgresLogFaultTest, OneOfTwoThatTakeOverAtOnceSucceeds) {
   const SceneKey scene = create("a", 1);
   const auto other = open_another();
@@ -316,13 +335,13 @@ TEST_F(PostgresLogFaultTest, AnAppendThatNoStandbyHasIsNotAcknowledged) {
   const SceneKey scene = create("a", 1);
   append(scene, 2);
   second.stop(SIGKILL);
-  std::thread restarter([this] {
-    std::this_thread::sleep_for(std::chrono::seconds(1));
-    engine_->restart(SIGKILL);
-  });
-  EXPECT_EQ(append_records(*log_, scene, 7, 1).code(), absl::StatusCode::kUnavailable);
-  restarter.join();
+  absl::Status status;
+  std::thread appender([&] { status = append_records(*log_, scene, 7, 1); });
+  std::this_thread::sleep_for(std::chrono::seconds(1));
+  engine_->restart(SIGKILL);
   EXPECT_EQ(engine_->query("SELECT last FROM locus.scene_log"), "3") << "a plain read shows what no standby has";
+  appender.join();
+  EXPECT_EQ(status.code(), absl::StatusCode::kUnavailable) << status;
   second.start();
   ASSERT_EQ(append_records(*log_, scene, 7, 2), absl::OkStatus());
   expect_records(scene, 1, 4);
@@ -358,23 +377,31 @@ TEST_F(PostgresLogFaultTest, AnEngineThatMayLoseAcknowledgedRecordsIsRefused) {
 
 TEST_F(PostgresLogFaultTest, AppendsStopWhenAnOperatorSwitchesReplicationOff) {
   log_ = nullptr;
-  engine_ = std::make_unique<PostgresServer>(PostgresServer::Settings{"synchronous_standby_names=two"});
-  const PostgresServer second(*engine_, "two");
+  engine_ = std::make_unique<PostgresServer>(PostgresServer::Settings{});
+  sql("ALTER SYSTEM SET synchronous_standby_names = 'two'");
+  sql("SELECT pg_reload_conf()");
+  PostgresServer second(*engine_, "two");
   PostgresOptions options = engine_->options({&second});
   options.append_wait = std::chrono::milliseconds(1'500);
   log_ = open_and_lead(options);
   ASSERT_NE(log_, nullptr);
-  const SceneKey scene = create("a", 1);
-  append(scene, 3);
-  sql("ALTER SYSTEM SET synchronous_commit = 'local'");
+  std::vector<SceneKey> scenes;
+  for (const char* const name : {"a", "b", "c", "d"}) scenes.push_back(create(name, scenes.size() + 1));
+  second.stop(SIGKILL);  // from now on no append may be acknowledged
+  std::atomic<int> acknowledged = 0;
+  std::vector<std::thread> threads;
+  for (const SceneKey scene : scenes)
+    threads.emplace_back([&, scene] {
+      for (int i = 0; i < 3; ++i) acknowledged += append_records(*log_, scene, 7, 1).ok() ? 1 : 0;
+    });
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  sql("ALTER SYSTEM SET synchronous_standby_names = ''");
   sql("SELECT pg_reload_conf()");
-  absl::Status status;
-  for (int i = 0; i < 300 && status.ok(); ++i) {
-    status = append_records(*log_, scene, 7, 1);
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(acknowledged, 0);
+  const absl::Status status = append_records(*log_, scenes[0], 7, 1);
   EXPECT_EQ(status.code(), absl::StatusCode::kFailedPrecondition) << status;
-  EXPECT_THAT(std::string(status.message()), HasSubstr("synchronous_commit"));
+  EXPECT_THAT(std::string(status.message()), HasSubstr("synchronous_standby_names"));
 }
 
 TEST_F(PostgresLogFaultTest, TablesOfANewerFormatAreRefused) {
@@ -395,7 +422,7 @@ TEST_F(PostgresLogFaultTest, SeveralDaemonsMayCreateTheTablesAtOnce) {
   EXPECT_EQ(engine_->query("SELECT count(*) FROM locus.format"), "1");
 }
 
-// Damages one row by `statement` and returns the error of `read`.
+// Scenes and a mesh, of which a test damages one row.
 class PostgresLogDamageTest : public PostgresLogFaultTest {
  protected:
   void SetUp() override {
