@@ -155,7 +155,9 @@ absl::StatusOr<uint64_t> PostgresLog::append(SceneKey key, absl::Span<const LogE
 }
 
 void PostgresLog::commit_group(absl::Span<Append* const> group) const {
-  const Deadline deadline = change_deadline();
+  uint64_t bytes = 0;
+  for (const Append* const append : group) bytes += append->bytes;
+  const Deadline deadline = change_deadline(bytes);
   std::vector<Append*> left(group.begin(), group.end());
   while (true) {
     const absl::Status status = send_appends(left, deadline);

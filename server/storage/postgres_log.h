@@ -138,11 +138,14 @@ class PostgresLog final : public UpdateLog {
   // Returns a connection in a transaction that reads one state of all tables. Tries hosts until one has committed a
   // barrier, so that the state is not older than this call.
   absl::StatusOr<EnginePool::Lease> begin_read() const;
-  // Returns the deadline of one answer; sending `bytes` may take a second for each 8 MiB in addition.
+  // Return the deadline of one answer, and that of a change with all of its attempts. Sending `bytes` may take a second
+  // for each 8 MiB in addition.
   Deadline answer_deadline(uint64_t bytes = 0) const {
     return std::chrono::steady_clock::now() + options_.answer_wait + std::chrono::milliseconds(bytes >> 13);
   }
-  Deadline change_deadline() const { return std::chrono::steady_clock::now() + options_.append_wait; }
+  Deadline change_deadline(uint64_t bytes = 0) const {
+    return std::chrono::steady_clock::now() + options_.append_wait + std::chrono::milliseconds(bytes >> 13);
+  }
 
   // Runs the added statements and a barrier, and checks the engine's settings.
   absl::Status run_barrier(EngineConnection& connection) const;
