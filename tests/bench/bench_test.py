@@ -244,6 +244,8 @@ class SuiteRun:
         with tempfile.TemporaryDirectory() as folder:
             path = os.path.join(folder, "cells.json")
             cls.answer = run(cls.SUITE, "--quick", "--json", path)
+            if not os.path.exists(path):
+                raise AssertionError(f"{cls.SUITE} wrote no cells:\n{cls.answer.stdout}{cls.answer.stderr}")
             with open(path, encoding="utf-8") as file:
                 cls.cells = json.load(file)
 
