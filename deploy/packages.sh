@@ -132,6 +132,7 @@ case " $missing " in
     $as_root mkdir -p "${no_database%/*}"
     echo "create_main_cluster = false" | $as_root tee "$no_database" >/dev/null
     trap '$as_root rm -f "$no_database"' EXIT
+    trap 'exit 130' INT TERM HUP
     ;;
 esac
 $as_root env DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-install-recommends $missing </dev/null

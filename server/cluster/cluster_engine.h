@@ -82,8 +82,8 @@ class ClusterEngine {
   virtual absl::StatusOr<bool> mark_dead(SeenBeat seen) = 0;
   // Marks a member as dead whatever its beat is. Only the member itself calls it. Does nothing if the id is unknown.
   virtual absl::Status leave(MemberId id) = 0;
-  // Deletes a dead member that leads no scene. Returns FAILED_PRECONDITION if it is living or leads a scene. Does
-  // nothing if the id is unknown.
+  // Removes a dead member that leads no scene from all lists. Returns FAILED_PRECONDITION if it is living or leads a
+  // scene. Does nothing if the id is unknown. The id stays taken, so that a late join() does not make it live again.
   virtual absl::Status forget(MemberId id) = 0;
   // Returns all living members. Cost: the size of the cluster.
   virtual absl::StatusOr<std::vector<MemberRow>> members() = 0;

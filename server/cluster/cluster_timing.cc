@@ -15,8 +15,8 @@ void ClusterTiming::check() const {
 }
 
 ClusterTime time_since_boot() {
-  timespec now;
-  clock_gettime(CLOCK_BOOTTIME, &now);
+  timespec now = {};
+  LOCUS_CHECK_EQ(clock_gettime(CLOCK_BOOTTIME, &now), 0);
   return ClusterTime(std::chrono::seconds(now.tv_sec) + std::chrono::nanoseconds(now.tv_nsec));
 }
 

@@ -1,6 +1,7 @@
 #include "server/config/config_file.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <fstream>
 #include <sstream>
 
@@ -62,6 +63,8 @@ std::string with_line_of_file(const CLI::App& app, const std::vector<std::string
   const CLI::Option* file = app.get_config_ptr();
   if (file == nullptr || file->count() == 0) return message;
   const auto path = file->as<std::string>();
+  std::error_code why;
+  if (!std::filesystem::is_regular_file(path, why)) return message;  // a pipe cannot be read a second time
   if (dynamic_cast<const CLI::ConfigError*>(&error) != nullptr) {
     const std::string unknown = unknown_line(app, path);
     return unknown.empty() ? message : unknown;

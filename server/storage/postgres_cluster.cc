@@ -28,7 +28,7 @@ std::vector<LeaderRow> leader_rows(const EngineRows& rows) {
 absl::StatusOr<std::unique_ptr<PostgresCluster>> PostgresCluster::open(const PostgresOptions& options) {
   ASSIGN_OR_RETURN(EngineAddress address, EngineAddress::parse(options.url));
   std::unique_ptr<PostgresCluster> cluster(new PostgresCluster(options, std::move(address)));
-  RETURN_IF_ERROR(cluster->acquire().status());
+  RETURN_IF_ERROR(cluster->pool_.acquire(EnginePool::Use::kOther, cluster->answer_deadline()).status());
   return cluster;
 }
 
@@ -40,27 +40,29 @@ PostgresCluster::PostgresCluster(const PostgresOptions& options, EngineAddress a
               return prepare_tables(connection, deadline);
             }) {}
 
-absl::StatusOr<EnginePool::Lease> PostgresCluster::acquire() const {
-  return pool_.acquire(EnginePool::Use::kOther, answer_deadline());
+absl::StatusOr<EnginePool::Lease> PostgresCluster::acquire(EnginePool::Use use) const {
+  absl::StatusOr<EnginePool::Lease> lease = pool_.acquire(use, answer_deadline());
+  if (!lease.ok()) return absl::UnavailableError(lease.status().message());
+  return lease;
 }
 
 absl::Status PostgresCluster::run(EngineConnection& connection) const {
   absl::Status status = run_checked(connection, options_.replication, answer_deadline());
-  return status.ok() || absl::IsFailedPrecondition(status) ? status : absl::UnavailableError(status.message());
+  return status.ok() ? status : absl::UnavailableError(status.message());
 }
 
 absl::Status PostgresCluster::join(MemberId id, const MemberInfo& info, uint64_t load) {
-  ASSIGN_OR_RETURN(const EnginePool::Lease lease, acquire());
+  ASSIGN_OR_RETURN(const EnginePool::Lease lease, acquire(EnginePool::Use::kUrgent));
   lease->add(
-      "INSERT INTO locus.member (id, address, zone, version, load, beat, dead, assigned)"
-      " VALUES ($1::bigint, $2::text, $3::text, $4::text, $5::bigint, 0, 0, 0) ON CONFLICT (id) DO NOTHING",
+      "INSERT INTO locus.member (id, address, zone, version, load, beat, dead, assigned, forgotten)"
+      " VALUES ($1::bigint, $2::text, $3::text, $4::text, $5::bigint, 0, 0, 0, 0) ON CONFLICT (id) DO NOTHING",
       SqlParameters().number(id).text(info.address).text(info.zone).text(info.version).number(load));
   add_barrier(*lease);
   return run(*lease);
 }
 
 absl::StatusOr<BeatReply> PostgresCluster::beat(MemberId id, uint64_t load, size_t watched) {
-  ASSIGN_OR_RETURN(const EnginePool::Lease lease, acquire());
+  ASSIGN_OR_RETURN(const EnginePool::Lease lease, acquire(EnginePool::Use::kUrgent));
   lease->add(
       "UPDATE locus.member SET beat = beat + 1, load = $2::bigint WHERE id = $1::bigint AND dead = 0 RETURNING "
       "assigned",
@@ -86,7 +88,7 @@ absl::StatusOr<BeatReply> PostgresCluster::beat(MemberId id, uint64_t load, size
 }
 
 absl::StatusOr<bool> PostgresCluster::mark_dead(SeenBeat seen) {
-  ASSIGN_OR_RETURN(const EnginePool::Lease lease, acquire());
+  ASSIGN_OR_RETURN(const EnginePool::Lease lease, acquire(EnginePool::Use::kOther));
   lease->add("UPDATE locus.member SET dead = 1 WHERE id = $1::bigint AND beat = $2::bigint AND dead = 0",
              SqlParameters().number(seen.id).number(seen.beat));
   lease->add("SELECT id FROM locus.member WHERE id = $1::bigint AND dead = 0", SqlParameters().number(seen.id));
@@ -96,20 +98,22 @@ absl::StatusOr<bool> PostgresCluster::mark_dead(SeenBeat seen) {
 }
 
 absl::Status PostgresCluster::leave(MemberId id) {
-  ASSIGN_OR_RETURN(const EnginePool::Lease lease, acquire());
+  ASSIGN_OR_RETURN(const EnginePool::Lease lease, acquire(EnginePool::Use::kUrgent));
   lease->add("UPDATE locus.member SET dead = 1 WHERE id = $1::bigint AND dead = 0", SqlParameters().number(id));
   add_barrier(*lease);
   return run(*lease);
 }
 
 absl::Status PostgresCluster::forget(MemberId id) {
-  ASSIGN_OR_RETURN(const EnginePool::Lease lease, acquire());
-  // A dead member gets no scene, so it leads none afterwards either.
+  ASSIGN_OR_RETURN(const EnginePool::Lease lease, acquire(EnginePool::Use::kOther));
+  // A dead member gets no scene, so it leads none afterwards either. The row of a forgotten member (dead = 2) stays for
+  // a day, in which a late join() finds it.
   lease->add(
-      "DELETE FROM locus.member WHERE id = $1::bigint AND dead = 1"
-      " AND NOT EXISTS (SELECT FROM locus.scene_log WHERE leader = $1::bigint)",
+      "UPDATE locus.member SET dead = 2, forgotten = extract(epoch FROM now())::bigint WHERE id = $1::bigint"
+      " AND dead = 1 AND NOT EXISTS (SELECT FROM locus.scene_log WHERE leader = $1::bigint)",
       SqlParameters().number(id));
-  lease->add("SELECT dead FROM locus.member WHERE id = $1::bigint", SqlParameters().number(id));
+  lease->add("SELECT dead FROM locus.member WHERE id = $1::bigint AND dead < 2", SqlParameters().number(id));
+  lease->add("DELETE FROM locus.member WHERE dead = 2 AND forgotten < extract(epoch FROM now())::bigint - 86400");
   add_barrier(*lease);
   RETURN_IF_ERROR(run(*lease));
   const EngineRows& left = lease->results()[1];
@@ -119,7 +123,7 @@ absl::Status PostgresCluster::forget(MemberId id) {
 }
 
 absl::StatusOr<std::vector<MemberRow>> PostgresCluster::members() {
-  ASSIGN_OR_RETURN(const EnginePool::Lease lease, acquire());
+  ASSIGN_OR_RETURN(const EnginePool::Lease lease, acquire(EnginePool::Use::kOther));
   lease->add("SELECT id, address, zone, version, load, beat FROM locus.member WHERE dead = 0 ORDER BY id");
   add_barrier(*lease);
   RETURN_IF_ERROR(run(*lease));
@@ -136,7 +140,7 @@ absl::StatusOr<std::vector<MemberRow>> PostgresCluster::members() {
 }
 
 absl::StatusOr<std::vector<LeaderRow>> PostgresCluster::scenes_led_by(MemberId leader) {
-  ASSIGN_OR_RETURN(const EnginePool::Lease lease, acquire());
+  ASSIGN_OR_RETURN(const EnginePool::Lease lease, acquire(EnginePool::Use::kOther));
   lease->add(LOCUS_LEADER_ROWS "WHERE l.leader = $1::bigint ORDER BY l.scene", SqlParameters().number(leader));
   add_barrier(*lease);
   RETURN_IF_ERROR(run(*lease));
@@ -144,10 +148,11 @@ absl::StatusOr<std::vector<LeaderRow>> PostgresCluster::scenes_led_by(MemberId l
 }
 
 absl::StatusOr<std::vector<LeaderRow>> PostgresCluster::scenes_without_leader() {
-  ASSIGN_OR_RETURN(const EnginePool::Lease lease, acquire());
-  lease->add(LOCUS_LEADER_ROWS
-             "LEFT JOIN locus.member m ON m.id = l.leader WHERE m.id IS NULL ORDER BY l.scene LIMIT $1::bigint",
-             SqlParameters().number(kMaxListed));
+  ASSIGN_OR_RETURN(const EnginePool::Lease lease, acquire(EnginePool::Use::kOther));
+  lease->add(
+      LOCUS_LEADER_ROWS
+      "LEFT JOIN locus.member m ON m.id = l.leader AND m.dead < 2 WHERE m.id IS NULL ORDER BY l.scene LIMIT $1::bigint",
+      SqlParameters().number(kMaxListed));
   add_barrier(*lease);
   RETURN_IF_ERROR(run(*lease));
   return leader_rows(lease->results()[0]);
@@ -163,7 +168,7 @@ absl::StatusOr<LeaderRow> PostgresCluster::hand_over(SceneKey scene, Token token
 
 absl::StatusOr<LeaderRow> PostgresCluster::change_leader(SceneKey scene, Token token, std::optional<MemberId> from,
                                                          MemberId to) const {
-  ASSIGN_OR_RETURN(const EnginePool::Lease lease, acquire());
+  ASSIGN_OR_RETURN(const EnginePool::Lease lease, acquire(EnginePool::Use::kOther));
   // One round trip, so that no lock waits for this daemon. The lock of the member's row keeps it from being marked dead
   // until the commit; it is taken first by each change of a leader.
   lease->add("SELECT id FROM locus.member WHERE id = $1::bigint AND dead = 0 FOR NO KEY UPDATE",

@@ -2,9 +2,9 @@
 // members; `scene_log` has leader and token of each scene, which PostgresLog names in each append.
 //
 // Threads: any thread may call any member. Calls wait for the engine, at most for PostgresOptions::answer_wait for a
-// connection and as long for its answer. At most two connections are open, so that beats never wait for the bytes of
-// scenes. In addition to the errors of ClusterEngine, each call returns UNAVAILABLE for every failure of the engine,
-// and FAILED_PRECONDITION if the engine acknowledges before a second machine has synced.
+// connection and as long for its answer. At most four connections are open; beats have two of their own, so that they
+// wait neither for the bytes of scenes nor for other calls. Every failure of the engine is UNAVAILABLE, also if it
+// acknowledges before a second machine has synced.
 #ifndef LOCUS_SERVER_STORAGE_POSTGRES_CLUSTER_H_
 #define LOCUS_SERVER_STORAGE_POSTGRES_CLUSTER_H_
 
@@ -40,7 +40,7 @@ class PostgresCluster final : public ClusterEngine {
   PostgresCluster(const PostgresOptions& options, EngineAddress address);
 
   // Returns a connection; no attempt is repeated, because the members decide what to do next.
-  absl::StatusOr<EnginePool::Lease> acquire() const;
+  absl::StatusOr<EnginePool::Lease> acquire(EnginePool::Use use) const;
   Deadline answer_deadline() const { return std::chrono::steady_clock::now() + options_.answer_wait; }
   // Runs the added statements. Every failure of the engine becomes UNAVAILABLE.
   absl::Status run(EngineConnection& connection) const;

@@ -90,7 +90,21 @@ absl::StatusOr<EnginePool::Lease> PostgresLog::begin_read() const {
   }
 }
 
-void PostgresLog::lead(const StoredScene& scene, uint64_t member, uint64_t token, uint64_t chain) {
+PostgresLog::Retired PostgresLog::retire(SceneKey scene) {
+  LedPtr earlier;
+  {
+    MutexLock lock(mutex_);
+    const auto found = led_.find(scene);
+    if (found == led_.end()) return {};
+    earlier = found->second;
+  }
+  MutexLock writing(earlier->writing);
+  earlier->fenced = true;
+  return {earlier->token, earlier->possibly_last};
+}
+
+void PostgresLog::lead(const StoredScene& scene, uint64_t member, uint64_t token, uint64_t chain,
+                       uint64_t possibly_last) {
   auto state = std::make_shared<Led>();
   state->key = scene.key;
   state->name = scene.name;
@@ -102,6 +116,7 @@ void PostgresLog::lead(const StoredScene& scene, uint64_t member, uint64_t token
     state->last = scene.last_sequence;
     state->chain = chain;
     state->damage = scene.damage;
+    state->possibly_last = possibly_last;
     state->known_last = scene.last_sequence;
   }
   MutexLock lock(mutex_);
@@ -181,7 +196,7 @@ void PostgresLog::commit_group(absl::Span<Append* const> group) const {
 absl::Status PostgresLog::send_appends(absl::Span<Append* const> appends, Deadline deadline) const {
   std::vector<Append*> open;  // appends whose outcome must be found out
   {
-    ASSIGN_OR_RETURN(const EnginePool::Lease lease, acquire(EnginePool::Use::kAppend, deadline));
+    ASSIGN_OR_RETURN(const EnginePool::Lease lease, acquire(EnginePool::Use::kUrgent, deadline));
     for (const Append* const append : appends) lease->add_prepared(kAppendName, append_parameters(*append));
     uint64_t bytes = 0;
     for (const Append* const append : appends) bytes += append->bytes;
@@ -209,7 +224,7 @@ absl::Status PostgresLog::resolve(absl::Span<Append* const> appends, Deadline de
   std::vector<uint64_t> keys;
   for (const Append* const append : appends) keys.push_back(append->scene);
   while (true) {
-    ASSIGN_OR_RETURN(const EnginePool::Lease lease, acquire(EnginePool::Use::kAppend, deadline));
+    ASSIGN_OR_RETURN(const EnginePool::Lease lease, acquire(EnginePool::Use::kUrgent, deadline));
     // The lock waits for a transaction of the lost connection that still waits for the standbys, and the commit of this
     // transaction waits for them too. A plain read would show what no standby has.
     const bool plain = planted(PlantedBug::kResolvedByPlainRead);
@@ -270,9 +285,9 @@ absl::Status PostgresLog::remove_possibly_written(Led& led) {
     const EngineRows& found = connection.results()[0];
     return !found.empty() && found.number(0, 0) == led.member && found.number(0, 1) == token + 1;
   };
-  absl::Status status = transact(EnginePool::Use::kAppend, remove, removed);
+  absl::Status status = transact(EnginePool::Use::kUrgent, remove, removed);
   if (absl::IsAborted(status)) {  // an earlier call may have removed them, and its answer was lost
-    ASSIGN_OR_RETURN(const EnginePool::Lease lease, acquire(EnginePool::Use::kAppend, change_deadline()));
+    ASSIGN_OR_RETURN(const EnginePool::Lease lease, acquire(EnginePool::Use::kUrgent, change_deadline()));
     ASSIGN_OR_RETURN(const bool earlier, removed(*lease));
     led.fenced = !earlier;
     if (earlier) status = absl::OkStatus();

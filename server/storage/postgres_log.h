@@ -131,7 +131,15 @@ class PostgresLog final : public UpdateLog {
   absl::Status list_stored();
 
   absl::StatusOr<LedPtr> led(SceneKey scene) const LOCUS_EXCLUDES(mutex_);
-  void lead(const StoredScene& scene, uint64_t member, uint64_t token, uint64_t chain) LOCUS_EXCLUDES(mutex_);
+  // Ends an earlier leadership of this daemon: waits for an append in progress and refuses later ones, because only the
+  // new state will know where the log ends. Returns what may still arrive with the earlier token.
+  struct Retired {
+    uint64_t token = 0;
+    uint64_t possibly_last = 0;
+  };
+  Retired retire(SceneKey scene) LOCUS_EXCLUDES(mutex_);
+  void lead(const StoredScene& scene, uint64_t member, uint64_t token, uint64_t chain, uint64_t possibly_last)
+      LOCUS_EXCLUDES(mutex_);
 
   // Returns a connection; tries again while the engine is away, until the deadline.
   absl::StatusOr<EnginePool::Lease> acquire(EnginePool::Use use, Deadline deadline) const;

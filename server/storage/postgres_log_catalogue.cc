@@ -149,6 +149,7 @@ absl::StatusOr<StoredScene> PostgresLog::take_over(SceneKey scene, uint64_t toke
 }
 
 absl::StatusOr<StoredScene> PostgresLog::begin_leading(SceneKey scene, uint64_t member, uint64_t token) {
+  const Retired retired = retire(scene);
   ASSIGN_OR_RETURN(const EnginePool::Lease lease, begin_read());
   lease->add(LOCUS_STORED_SCENES "WHERE s.key = $1::bigint", SqlParameters().number(scene));
   lease->add("COMMIT");
@@ -158,7 +159,7 @@ absl::StatusOr<StoredScene> PostgresLog::begin_leading(SceneKey scene, uint64_t 
   StoredScene stored = stored_scene(found, 0);
   if (found.number(0, kSceneColumns + 3) != member || found.number(0, kSceneColumns + 4) != token)
     return refuse_fenced(stored.name);
-  lead(stored, member, token, found.number(0, kSceneColumns + 2));
+  lead(stored, member, token, found.number(0, kSceneColumns + 2), retired.token == token ? retired.possibly_last : 0);
   return stored;
 }
 
@@ -273,7 +274,7 @@ absl::StatusOr<SceneKey> PostgresLog::create_scene(absl::string_view name, absl:
   stored.key = row.key;
   stored.name = row.name;
   stored.epoch = epoch;
-  lead(stored, options_.member, 1, row.snapshot_chain);
+  lead(stored, options_.member, 1, row.snapshot_chain, 0);
   return row.key;
 }
 
@@ -294,7 +295,7 @@ absl::Status PostgresLog::delete_scene(SceneKey key) {
     RETURN_IF_ERROR(run_barrier(connection));
     return connection.results()[0].empty();
   };
-  absl::Status status = transact(EnginePool::Use::kAppend, remove, removed);
+  absl::Status status = transact(EnginePool::Use::kUrgent, remove, removed);
   if (absl::IsAborted(status)) scene.fenced = fenced;
   if (!status.ok() && !absl::IsNotFound(status)) return status;
   MutexLock lock(mutex_);
@@ -323,7 +324,7 @@ absl::Status PostgresLog::change_row(SceneKey key, absl::FunctionRef<void(Stored
     const EngineRows& found = connection.results()[0];
     return !found.empty() && found.number(0, 0) == checksum_of(row);
   };
-  const absl::Status status = transact(EnginePool::Use::kAppend, update, was_done);
+  const absl::Status status = transact(EnginePool::Use::kUrgent, update, was_done);
   if (absl::IsAborted(status)) scene.fenced = fenced;
   RETURN_IF_ERROR(status);
   scene.epoch = row.epoch;

@@ -64,7 +64,8 @@ class PostgresServer {
                           "-k", folder_.path(),
                           "-c", "listen_addresses=",
                           "-c", "max_connections=200",
-                          "-c", "shared_buffers=16MB"};
+                          "-c", "shared_buffers=16MB",
+                          "-c", "dynamic_shared_memory_type=mmap"};
     for (const std::string& setting : settings_) arguments.insert(arguments.end(), {"-c", setting});
     process_ = as_postgres("postgres", arguments, "log");
     for (int i = 0; i < 3000; ++i) {

@@ -71,7 +71,7 @@ class SimulatedEngine : public server::ClusterEngine {
 
   absl::Status join(MemberId id, const server::MemberInfo& info, uint64_t load) override {
     const MutexLock lock(mutex_);
-    if (members_.contains(id)) return absl::OkStatus();
+    if (members_.contains(id) || forgotten_.contains(id)) return absl::OkStatus();
     members_[id].row = {id, info, load, 0, false};
     living_.insert(id);
     return absl::OkStatus();
@@ -118,7 +118,7 @@ class SimulatedEngine : public server::ClusterEngine {
     if (const auto led = led_.find(id); led != led_.end() && !led->second.empty())
       return absl::FailedPreconditionError("the member leads scenes");
     dead_.erase(id);
-    members_.erase(id);
+    if (members_.erase(id) == 1) forgotten_.insert(id);
     return absl::OkStatus();
   }
 
@@ -199,6 +199,7 @@ class SimulatedEngine : public server::ClusterEngine {
   absl::flat_hash_map<MemberId, Member> members_ LOCUS_GUARDED_BY(mutex_);
   std::set<MemberId> living_ LOCUS_GUARDED_BY(mutex_);
   std::set<MemberId> dead_ LOCUS_GUARDED_BY(mutex_);
+  std::set<MemberId> forgotten_ LOCUS_GUARDED_BY(mutex_);
   absl::flat_hash_map<SceneKey, LeaderRow> scenes_ LOCUS_GUARDED_BY(mutex_);
   std::map<MemberId, std::set<SceneKey>> led_ LOCUS_GUARDED_BY(mutex_);  // by leader
 };

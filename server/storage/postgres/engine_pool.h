@@ -25,7 +25,7 @@ class EnginePool {
   // Function that checks and prepares each new connection before its first use.
   using Prepare = std::function<absl::Status(EngineConnection&, Deadline)>;
 
-  enum class Use : uint8_t { kAppend, kOther };
+  enum class Use : uint8_t { kUrgent, kOther };  // kUrgent: short calls that must not wait for others, such as appends
   static constexpr size_t kConnections = 2;
 
   EnginePool(EngineAddress address, std::chrono::milliseconds connect_wait, Prepare prepare)

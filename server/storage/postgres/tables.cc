@@ -22,7 +22,7 @@ constexpr const char* kTables[] = {
     "CREATE INDEX scene_of_leader ON locus.scene_log (leader)",
     "CREATE TABLE locus.member (id bigint PRIMARY KEY, address text NOT NULL, zone text NOT NULL,"
     " version text NOT NULL, load bigint NOT NULL, beat bigint NOT NULL, dead bigint NOT NULL,"
-    " assigned bigint NOT NULL)"
+    " assigned bigint NOT NULL, forgotten bigint NOT NULL)"
     " WITH (fillfactor = 50, autovacuum_vacuum_scale_factor = 0, autovacuum_vacuum_threshold = 1000)",
     "CREATE INDEX dead_member ON locus.member (id) WHERE dead = 1",
     "CREATE TABLE locus.record (scene bigint NOT NULL, sequence bigint NOT NULL, epoch bigint NOT NULL,"

@@ -152,7 +152,11 @@ class Machine:
         self.parent = subprocess.Popen(["bash", "-c", boot, "boot", group, folder, BOOT], stdin=subprocess.DEVNULL,
                                        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         self.init = self._first_process()
-        self.wait_until("is-system-running", "running")
+        try:
+            self.wait_until("is-system-running", "running")
+        except BaseException:
+            self.power_off()
+            raise
 
     def _first_process(self):
         deadline = time.monotonic() + BOOT_SECONDS

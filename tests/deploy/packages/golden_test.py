@@ -20,7 +20,8 @@ import packaged_programs
 class GoldenTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        os.makedirs(OPTIONS.work, exist_ok=True)
+        shutil.rmtree(OPTIONS.work, ignore_errors=True)
+        os.makedirs(OPTIONS.work)
         cls.programs = packaged_programs.unpack(OPTIONS.packages, os.path.join(OPTIONS.work, "unpacked"))
 
     @classmethod
