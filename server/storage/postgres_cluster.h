@@ -2,9 +2,9 @@
 // members; `scene_log` has leader and token of each scene, which PostgresLog names in each append.
 //
 // Threads: any thread may call any member. Calls wait for the engine, at most for PostgresOptions::answer_wait for a
-// connection and as long for its answer. At most four connections are open; beats have two of their own, so that they
-// wait neither for the bytes of scenes nor for other calls. Every failure of the engine is UNAVAILABLE, also if it
-// acknowledges before a second machine has synced.
+// connection and as long for its answer. Two or three connections are open as a rule; beats have their own, so
+// that they wait neither for the bytes of scenes nor for other calls. Every failure of the engine is UNAVAILABLE, also
+// if it acknowledges before a second machine has synced.
 #ifndef LOCUS_SERVER_STORAGE_POSTGRES_CLUSTER_H_
 #define LOCUS_SERVER_STORAGE_POSTGRES_CLUSTER_H_
 

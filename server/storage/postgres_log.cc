@@ -61,7 +61,7 @@ PostgresLog::PostgresLog(const PostgresOptions& options, EngineAddress address)
                     deadline);
               return connection.prepare(kAppendName, kAppendStatement, deadline);
             }),
-      queue_(EnginePool::kConnections, [this](absl::Span<Append* const> group) { commit_group(group); }) {}
+      queue_(EnginePool::kUrgentConnections, [this](absl::Span<Append* const> group) { commit_group(group); }) {}
 
 absl::StatusOr<PostgresLog::LedPtr> PostgresLog::led(SceneKey scene) const {
   MutexLock lock(mutex_);

@@ -11,7 +11,7 @@
 //
 // Threads: any thread may call any member, but append() for a scene only from one thread at a time. There is no thread
 // of its own. Members wait for the engine: a few times `append_wait` at most if it is away, and longer only while a
-// snapshot or mesh is sent and the engine makes progress. At most four connections are open.
+// snapshot or mesh is sent and the engine makes progress. At most six connections are open.
 #ifndef LOCUS_SERVER_STORAGE_POSTGRES_LOG_H_
 #define LOCUS_SERVER_STORAGE_POSTGRES_LOG_H_
 

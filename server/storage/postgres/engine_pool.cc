@@ -12,9 +12,9 @@ namespace locus::server {
 absl::StatusOr<EnginePool::Lease> EnginePool::acquire(Use use, Deadline deadline) {
   {
     MutexLock lock(mutex_);
-    while (in_use(use) >= kConnections) {
-      if (!returned_.wait_until(mutex_, deadline) && in_use(use) >= kConnections)
-        return absl::UnavailableError(absl::StrCat("all ", kConnections, " connections to the engine are in use"));
+    while (in_use(use) >= capacity(use)) {
+      if (!returned_.wait_until(mutex_, deadline) && in_use(use) >= capacity(use))
+        return absl::UnavailableError(absl::StrCat("all ", capacity(use), " connections to the engine are in use"));
     }
     ++in_use(use);
     if (!idle_.empty()) {

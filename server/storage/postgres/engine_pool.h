@@ -4,7 +4,8 @@
 // client that returns to it would wait for ever.
 //
 // Threads: any thread. acquire() waits for a free connection, or for a host to accept one; no lock is held while
-// connecting. Invariant: at most kConnections connections are in use for each purpose, and as many are idle at most.
+// connecting. Invariant: at most kUrgentConnections and kOtherConnections connections are in use, and no more than
+// their sum idle.
 #ifndef LOCUS_SERVER_STORAGE_POSTGRES_ENGINE_POOL_H_
 #define LOCUS_SERVER_STORAGE_POSTGRES_ENGINE_POOL_H_
 
@@ -26,7 +27,9 @@ class EnginePool {
   using Prepare = std::function<absl::Status(EngineConnection&, Deadline)>;
 
   enum class Use : uint8_t { kUrgent, kOther };  // kUrgent: short calls that must not wait for others, such as appends
-  static constexpr size_t kConnections = 2;
+  // With fewer connections for appends, an append would often wait for a commit that began just before it.
+  static constexpr size_t kUrgentConnections = 4;
+  static constexpr size_t kOtherConnections = 2;
 
   EnginePool(EngineAddress address, std::chrono::milliseconds connect_wait, Prepare prepare)
       : address_(std::move(address)), connect_wait_(connect_wait), prepare_(std::move(prepare)) {}
@@ -61,6 +64,7 @@ class EnginePool {
  private:
   absl::StatusOr<std::unique_ptr<EngineConnection>> connect(Deadline deadline) LOCUS_EXCLUDES(mutex_);
   void give_back(Use use, std::unique_ptr<EngineConnection> connection) LOCUS_EXCLUDES(mutex_);
+  static constexpr size_t capacity(Use use) { return use == Use::kUrgent ? kUrgentConnections : kOtherConnections; }
   size_t& in_use(Use use) LOCUS_REQUIRES(mutex_) { return in_use_[static_cast<size_t>(use)]; }
 
   const EngineAddress address_;
