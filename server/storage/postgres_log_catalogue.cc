@@ -353,7 +353,7 @@ absl::Status PostgresLog::write_snapshot(SceneKey key, uint64_t sequence, ChunkS
     if (sequence < before.snapshot_sequence || sequence > scene.known_last)
       return refuse_snapshot_at(sequence, before.snapshot_sequence, scene.known_last);
     ASSIGN_OR_RETURN(const ChunkList chunks, send_chunks(connection, kSnapshotChunkSql, key, id, state));
-    // From here on appends and other changes of the scene wait. The row is read again, because they did not wait
+    // Appends and other changes of the scene wait from here on. The row is read again, because they did not wait
     // before.
     MutexLock writing(scene.writing);
     RETURN_IF_ERROR(guard(connection, scene, fenced));

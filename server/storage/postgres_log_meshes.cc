@@ -135,7 +135,7 @@ absl::Status PostgresLog::delete_mesh(absl::string_view name) {
 }
 
 absl::Status PostgresLog::set_mesh_graces(absl::Span<const std::string> unordered, uint32_t grace_s) {
-  // In one order, so that two daemons that set equal names do not wait for each other.
+  // The names are locked in one order, so that two daemons that set equal names do not wait for each other.
   std::vector<std::string> names(unordered.begin(), unordered.end());
   std::sort(names.begin(), names.end());
   const auto set = [&](EngineConnection& connection) -> absl::Status {

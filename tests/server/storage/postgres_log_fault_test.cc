@@ -315,7 +315,7 @@ TEST_F(PostgresLogFaultTest, AppendsFollowThePromotedStandby) {
   ASSERT_NE(log_, nullptr);
   expect_exact_while(*log_, [&second] {
     std::this_thread::sleep_for(std::chrono::milliseconds(500));
-    // On a busy machine the standby may refuse a connection, or take long to be promoted.
+    // The standby may refuse a connection on a busy machine, or take long to be promoted.
     for (int i = 0; i < 600 && second.query("SELECT pg_is_in_recovery()") != "f"; ++i) {
       second.query("SELECT pg_promote(false)");
       std::this_thread::sleep_for(std::chrono::milliseconds(100));
