@@ -15,13 +15,13 @@
 #include "tests/bench/frame/race.h"
 #include "tests/bench/frame/results_hash.h"
 #include "tests/bench/frame/statistics.h"
+#include "tests/bench/log/log_scenes.h"
 #include "tests/bench/log/move_records.h"
 #include "tests/support/postgres_server.h"
 
 namespace locus::bench::cluster {
 namespace {
 
-constexpr uint64_t kEpoch = 1;
 constexpr const char* kMetric = "ns/append";
 
 // A primary that waits for one of two standbys, all on this machine.
@@ -49,44 +49,15 @@ struct Run {
   size_t appends(size_t moves) const { return (moves == 4096 ? 40 : 200) / (options.quick ? 10 : 1); }
 };
 
-// Scenes of one log, each with a thread of its own when appends are measured.
-class Scenes {
- public:
-  static absl::StatusOr<Scenes> create(const server::PostgresOptions& options, const std::string& prefix,
-                                       size_t count) {
-    auto log = server::PostgresLog::open(options);
-    if (!log.ok()) return log.status();
-    Scenes scenes;
-    scenes.log_ = *std::move(log);
-    for (size_t i = 0; i < count; ++i) {
-      const auto nothing = []() -> absl::StatusOr<std::optional<std::string>> { return std::nullopt; };
-      const auto key = scenes.log_->create_scene(absl::StrCat(prefix, "-", i), "", kEpoch, nothing);
-      if (!key.ok()) return key.status();
-      scenes.keys_.push_back(*key);
-    }
-    return scenes;
-  }
+using log::LogScenes;
 
-  absl::Status append(size_t scene, const std::string& record) const {
-    LogEntry entry;
-    entry.epoch = kEpoch;
-    entry.bytes = record;
-    return log_->append(keys_[scene], {&entry, 1}, AckLevel::kLocal).status();
-  }
-  absl::StatusOr<std::string> read_all(size_t scene) const {
-    std::string all;
-    absl::Status status = log_->read(keys_[scene], 1, [&all](const LogRecord& record) {
-      absl::StrAppend(&all, record.entry.bytes);
-      return absl::OkStatus();
-    });
-    if (!status.ok()) return status;
-    return all;
-  }
-
- private:
-  std::unique_ptr<server::PostgresLog> log_;
-  std::vector<SceneKey> keys_;
-};
+// Opens a log of the engine and creates scenes; appends to each come from a thread of its own.
+absl::StatusOr<LogScenes> create_scenes(const server::PostgresOptions& options, const std::string& prefix,
+                                        size_t count) {
+  auto log = server::PostgresLog::open(options);
+  if (!log.ok()) return log.status();
+  return LogScenes::create(*std::move(log), prefix, count);
+}
 
 // Calls `work` with each number below `count`, each in a thread of its own, and returns the first error.
 absl::Status in_threads(size_t count, const std::function<absl::Status(size_t)>& work) {
@@ -136,7 +107,7 @@ absl::Status measure_appends(const Run& run, size_t scenes, size_t moves) {
   if (!run.options.filter.wants(name)) return absl::OkStatus();
   run.progress(name);
   const std::vector<std::string> records = log::move_records(moves, run.appends(moves));
-  auto ours = Scenes::create(run.engine.options(), absl::StrCat(name, "/ours"), scenes);
+  auto ours = create_scenes(run.engine.options(), absl::StrCat(name, "/ours"), scenes);
   if (!ours.ok()) return ours.status();
   std::vector<BareClient> bare;
   for (size_t i = 0; i < scenes; ++i) {
@@ -183,7 +154,7 @@ absl::Status measure_sharing(const Run& run) {
   if (!run.options.filter.wants(name)) return absl::OkStatus();
   run.progress(name);
   const std::vector<std::string> records = log::move_records(kMoves, run.appends(kMoves));
-  auto scenes = Scenes::create(run.engine.options(), name, kMany + kFew);
+  auto scenes = create_scenes(run.engine.options(), name, kMany + kFew);
   if (!scenes.ok()) return scenes.status();
   absl::Status status;
   const auto contestant = [&](const char* called, size_t first, size_t count) {
@@ -218,12 +189,12 @@ absl::Status measure_quorum(const Run& run) {
   server::PostgresOptions alone = run.engine.options();
   alone.replication = server::EngineReplication::kStorage;
   alone.url += "&options=-csynchronous_commit%3Dlocal";
-  auto quorum = Scenes::create(run.engine.options(), absl::StrCat(name, "/quorum"), 1);
-  auto local = Scenes::create(alone, absl::StrCat(name, "/local"), 1);
+  auto quorum = create_scenes(run.engine.options(), absl::StrCat(name, "/quorum"), 1);
+  auto local = create_scenes(alone, absl::StrCat(name, "/local"), 1);
   if (!quorum.ok()) return quorum.status();
   if (!local.ok()) return local.status();
   absl::Status status;
-  const auto contestant = [&](const char* called, const Scenes& scenes) {
+  const auto contestant = [&](const char* called, const LogScenes& scenes) {
     return Contestant{called,
                       [&](size_t) {
                         for (const std::string& record : records) status.Update(scenes.append(0, record));

@@ -14,6 +14,7 @@
 #include "tests/bench/frame/statistics.h"
 #include "tests/bench/frame/temporary_folder.h"
 #include "tests/bench/log/log_run.h"
+#include "tests/bench/log/log_scenes.h"
 #include "tests/bench/log/mesh_case.h"
 #include "tests/bench/log/move_records.h"
 #include "tests/bench/log/raw_file.h"
@@ -21,7 +22,6 @@
 namespace locus::bench::log {
 namespace {
 
-constexpr uint64_t kEpoch = 1;
 constexpr size_t kWriters = 8;
 
 struct Size {
@@ -41,50 +41,14 @@ void hash_of(absl::string_view bytes, ResultsHash& hash) {
   for (const char byte : bytes) hash.add(static_cast<uint8_t>(byte));
 }
 
-// A data directory with empty scenes, as the daemon creates it.
-class OurLog {
- public:
-  static absl::StatusOr<OurLog> create(const std::string& path, size_t scenes) {
-    StorageOptions options;
-    options.path = path;
-    auto log = server::RocksdbLog::open(options);
-    if (!log.ok()) return log.status();
-    OurLog ours;
-    ours.log_ = *std::move(log);
-    for (size_t i = 0; i < scenes; ++i) {
-      const auto nothing = []() -> absl::StatusOr<std::optional<std::string>> { return std::nullopt; };
-      const auto key = ours.log_->create_scene(absl::StrCat("scene-", i), "", kEpoch, nothing);
-      if (!key.ok()) return key.status();
-      ours.keys_.push_back(*key);
-    }
-    return ours;
-  }
-
-  absl::Status append(size_t scene, const std::string& record) {
-    LogEntry entry;
-    entry.epoch = kEpoch;
-    entry.bytes = record;
-    return log_->append(keys_[scene], {&entry, 1}, AckLevel::kLocal).status();
-  }
-
-  absl::StatusOr<std::string> read_all(size_t scene) const {
-    std::string all;
-    const auto sink = [&all](const LogRecord& record) {
-      absl::StrAppend(&all, record.entry.bytes);
-      return absl::OkStatus();
-    };
-    if (absl::Status status = log_->read(keys_[scene], 1, sink); !status.ok()) return status;
-    return all;
-  }
-
- private:
-  using StorageOptions = server::StorageOptions;
-
-  OurLog() = default;
-
-  std::unique_ptr<UpdateLog> log_;
-  std::vector<SceneKey> keys_;
-};
+// Creates a data directory with empty scenes, as the daemon does.
+absl::StatusOr<LogScenes> create_log(const std::string& path, size_t scenes) {
+  server::StorageOptions options;
+  options.path = path;
+  auto log = server::RocksdbLog::open(options);
+  if (!log.ok()) return log.status();
+  return LogScenes::create(*std::move(log), "scene", scenes);
+}
 
 constexpr const char* kMetric = "ns/commit";
 
@@ -95,7 +59,7 @@ absl::Status measure_commits(const LogRun& run, const Size& size) {
   run.progress(name);
   const std::vector<std::string> records = move_records(size.moves, commits_of(run, size));
   const TemporaryFolder folder;
-  auto ours = OurLog::create(folder.file("data"), 1);
+  auto ours = create_log(folder.file("data"), 1);
   if (!ours.ok()) return ours.status();
   const uint64_t reserved = commits_of_all(run, size) * records.front().size();
   auto plain = RawFile::create(folder.file("plain"), 0);
@@ -144,7 +108,7 @@ absl::Status measure_writers(const LogRun& run, const Size& size) {
   const std::vector<std::string> records =
       move_records(size.moves, std::max<size_t>(1, commits_of(run, size) / kWriters));
   const TemporaryFolder folder;
-  auto ours = OurLog::create(folder.file("data"), kWriters + 1);
+  auto ours = create_log(folder.file("data"), kWriters + 1);
   if (!ours.ok()) return ours.status();
   std::vector<absl::Status> statuses(kWriters + 1);
   const auto write = [&](size_t scene) {
