@@ -47,7 +47,9 @@ std::vector<BlockingMethod> HealthService::methods() {
 
 absl::Status HealthService::check(const Request& request, Response& response) const {
   if (!is_known(request.service())) return absl::NotFoundError("there is no service of this name");
-  response.set_status(status_of(state()));
+  const State now = state();
+  // Calls are served from the moment when the recovery ends, which is before serving() is called.
+  response.set_status(status_of(now == State::kStarting && !host_.recovering ? State::kServing : now));
   return absl::OkStatus();
 }
 

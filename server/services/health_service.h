@@ -34,7 +34,7 @@ class HealthService {
  private:
   using Request = grpc::health::v1::HealthCheckRequest;
   using Response = grpc::health::v1::HealthCheckResponse;
-  enum class State : uint8_t { kServing, kNotServing, kEnded };
+  enum class State : uint8_t { kStarting, kServing, kNotServing, kEnded };
 
   absl::Status check(const Request& request, Response& response) const LOCUS_EXCLUDES(mutex_);
   absl::Status watch(const Caller& caller, const Request& request, MessageStream& stream) LOCUS_EXCLUDES(mutex_);
@@ -47,7 +47,7 @@ class HealthService {
   Host& host_;
   mutable Mutex mutex_;
   ConditionVariable changed_;
-  State state_ LOCUS_GUARDED_BY(mutex_) = State::kNotServing;
+  State state_ LOCUS_GUARDED_BY(mutex_) = State::kStarting;
 };
 
 }  // namespace locus::server

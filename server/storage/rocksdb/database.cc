@@ -77,6 +77,12 @@ rocksdb::ColumnFamilyOptions family_options(uint64_t buffer_bytes, OpenMode mode
   return options;
 }
 
+// Returns true if the thread of a running flush may have reported an error of this kind.
+bool may_come_from_flush(rocksdb::BackgroundErrorReason reason) {
+  using Reason = rocksdb::BackgroundErrorReason;
+  return reason != Reason::kWriteCallback && reason != Reason::kMemTable && reason != Reason::kCompaction;
+}
+
 }  // namespace
 
 // Listener that lets recover(), and nothing else, resume the database after every disk error. Without this listener
@@ -85,6 +91,7 @@ rocksdb::ColumnFamilyOptions family_options(uint64_t buffer_bytes, OpenMode mode
 class Database::ErrorWatch final : public rocksdb::EventListener {
  public:
   std::atomic<bool> seen = false;
+  std::atomic<bool> seen_again = false;  // a further error came before recover()
 
   // Sets the database whose flushes the first error waits for; null until the database is open, during recover(), and
   // once it closes. Returns when no thread of RocksDB uses the earlier database any more.
@@ -94,10 +101,13 @@ class Database::ErrorWatch final : public rocksdb::EventListener {
   }
 
   // RocksDB calls this function before it stops background work because of the error, without holding its mutex.
-  void OnBackgroundError(rocksdb::BackgroundErrorReason, rocksdb::Status* error) override LOCUS_EXCLUDES(mutex_) {
+  void OnBackgroundError(rocksdb::BackgroundErrorReason reason, rocksdb::Status* error) override
+      LOCUS_EXCLUDES(mutex_) {
     if (!seen.exchange(true)) {
       MutexLock lock(mutex_);
-      if (database_ != nullptr) database_->wait_for_flush_start();
+      if (database_ != nullptr) database_->wait_for_flush_start(may_come_from_flush(reason));
+    } else {
+      seen_again = true;
     }
     if (error->IsIOError() && !error->IsIOFenced() && error->severity() > rocksdb::Status::Severity::kHardError)
       *error = rocksdb::Status(*error, rocksdb::Status::Severity::kHardError);
@@ -233,6 +243,7 @@ absl::Status Database::recover(uint64_t free_bytes) {
   while (writers_ > 0) std::this_thread::sleep_for(kBufferPoll);
   errors_->watch(nullptr);
   errors_->seen = false;
+  errors_->seen_again = false;
   rocksdb::Status status = db_->Resume();
   // If the memory tables are empty, Resume() flushes nothing and keeps the log file in which a write failed. Then
   // flush_to_new_log() fails too, but leaves a row in the memory tables, so that the next call of recover() succeeds.
@@ -279,11 +290,16 @@ void Database::wait_for_buffers(rocksdb::ColumnFamilyHandle* family) const {
     std::this_thread::sleep_for(kBufferPoll);
 }
 
-void Database::wait_for_flush_start() const {
+void Database::wait_for_flush_start(bool called_by_flush) const {
   const auto waits_for_start = [&] {
     uint64_t running = 0;
     uint64_t pending = 0;
-    if (!db_->GetIntProperty(rocksdb::DB::Properties::kNumRunningFlushes, &running) || running > 0) return false;
+    if (errors_->seen_again) return false;  // the running flush failed: RocksDB schedules no other one
+    // While a flush runs, a pending one is not scheduled. If the running flush is the caller, background work stops
+    // before it ends, and the pending flush waits for Resume(). Any other running flush may end just before background
+    // work stops, so that the pending flush is scheduled and then dropped.
+    if (called_by_flush && (!db_->GetIntProperty(rocksdb::DB::Properties::kNumRunningFlushes, &running) || running > 0))
+      return false;
     return std::any_of(families_.begin(), families_.end(), [&](rocksdb::ColumnFamilyHandle* family) {
       return db_->GetIntProperty(family, rocksdb::DB::Properties::kMemTableFlushPending, &pending) && pending > 0;
     });

@@ -94,8 +94,9 @@ class Database {
   absl::Status fail_writes(const rocksdb::Status& status) LOCUS_EXCLUDES(mutex_);
   // Waits until a scheduled flush has started or there is none, for at most about ten seconds. RocksDB 7.8 drops a
   // flush that starts after an error stopped background work, but keeps the column family marked as queued, so that no
-  // later flush of the family, not even the one of Resume(), ever starts.
-  void wait_for_flush_start() const;
+  // later flush of the family, not even the one of Resume(), ever starts. `called_by_flush`: the caller is possibly the
+  // thread of a running flush, for which a pending flush waits.
+  void wait_for_flush_start(bool called_by_flush) const;
   // Writes a row with the key kFamilyMark into the memory table of every family, bypassing the write-ahead log, and
   // flushes all families. Afterwards no earlier log file is needed.
   rocksdb::Status flush_to_new_log();
