@@ -1,6 +1,7 @@
 #include "server/storage/postgres_log.h"
 
 #include <algorithm>
+#include <limits>
 #include <thread>
 #include <utility>
 
@@ -44,7 +45,11 @@ absl::StatusOr<std::unique_ptr<PostgresLog>> PostgresLog::open(const PostgresOpt
   PostgresOptions named = options;
   if (named.member == 0) named.member = random_id() >> 1 | 1;  // a positive bigint
   std::unique_ptr<PostgresLog> log(new PostgresLog(named, std::move(address)));
-  RETURN_IF_ERROR(log->list_stored());
+  if (named.list_catalogue) {
+    RETURN_IF_ERROR(log->list_stored());
+  } else {
+    RETURN_IF_ERROR(log->begin_read().status());  // a host must accept writes, and its settings must be right
+  }
   return log;
 }
 
@@ -90,6 +95,24 @@ absl::StatusOr<EnginePool::Lease> PostgresLog::begin_read() const {
   }
 }
 
+void PostgresLog::set_fenced(Led& led) {
+  led.fence_unreported |= !led.fenced;
+  led.fenced = true;
+}
+
+void PostgresLog::report(Led& led) const {
+  uint64_t before, now;
+  bool fenced;
+  {
+    MutexLock writing(led.writing);
+    now = led.token;
+    before = std::exchange(led.reported_token, now);
+    fenced = std::exchange(led.fence_unreported, false);
+  }
+  if (before != now && options_.on_token) options_.on_token(led.key, before, now);
+  if (fenced && options_.on_fenced) options_.on_fenced(led.key, now);
+}
+
 PostgresLog::Retired PostgresLog::retire(SceneKey scene) {
   LedPtr earlier;
   {
@@ -112,6 +135,7 @@ void PostgresLog::lead(const StoredScene& scene, uint64_t member, uint64_t token
     MutexLock writing(state->writing);
     state->member = member;
     state->token = token;
+    state->reported_token = token;
     state->epoch = scene.epoch;
     state->last = scene.last_sequence;
     state->chain = chain;
@@ -126,13 +150,20 @@ void PostgresLog::lead(const StoredScene& scene, uint64_t member, uint64_t token
 absl::StatusOr<uint64_t> PostgresLog::append(SceneKey key, absl::Span<const LogEntry> entries, AckLevel) {
   ASSIGN_OR_RETURN(const LedPtr state, led(key));
   Led& scene = *state;
+  {
+    // Other threads learn the new token before records are written under it.
+    const Report report(*this, scene);
+    MutexLock writing(scene.writing);
+    if (!entries.empty() && scene.damage.ok() && !scene.fenced && scene.possibly_last != 0 &&
+        !planted(PlantedBug::kLostAppendKept))
+      RETURN_IF_ERROR(remove_possibly_written(scene));
+  }
+  const Report report(*this, scene);
   MutexLock writing(scene.writing);
   if (entries.empty()) return scene.last;
   if (!scene.damage.ok()) return scene.damage;
   if (scene.fenced) return refuse_fenced(scene.name);
   if (scene.epoch != entries.front().epoch) return refuse_epoch(scene.name, scene.epoch, entries.front().epoch);
-  if (scene.possibly_last != 0 && !planted(PlantedBug::kLostAppendKept))
-    RETURN_IF_ERROR(remove_possibly_written(scene));
   Append append;
   append.scene = key;
   append.token = scene.token;
@@ -158,7 +189,7 @@ absl::StatusOr<uint64_t> PostgresLog::append(SceneKey key, absl::Span<const LogE
       scene.known_last = scene.last;
       return scene.last;
     case Append::Outcome::kFenced:
-      scene.fenced = true;
+      set_fenced(scene);
       return refuse_fenced(scene.name);
     case Append::Outcome::kUnknown:
       scene.possibly_last = scene.last + entries.size();
@@ -289,7 +320,7 @@ absl::Status PostgresLog::remove_possibly_written(Led& led) {
   if (absl::IsAborted(status)) {  // an earlier call may have removed them, and its answer was lost
     ASSIGN_OR_RETURN(const EnginePool::Lease lease, acquire(EnginePool::Use::kUrgent, change_deadline()));
     ASSIGN_OR_RETURN(const bool earlier, removed(*lease));
-    led.fenced = !earlier;
+    if (!earlier) set_fenced(led);
     if (earlier) status = absl::OkStatus();
   }
   RETURN_IF_ERROR(status);
@@ -315,6 +346,10 @@ absl::StatusOr<uint64_t> PostgresLog::latest(SceneKey scene) const {
 }
 
 absl::Status PostgresLog::read(SceneKey key, uint64_t from, RecordSink sink) const {
+  return read_until(key, from, std::numeric_limits<uint64_t>::max(), sink);
+}
+
+absl::Status PostgresLog::read_until(SceneKey key, uint64_t from, uint64_t until, RecordSink sink) const {
   // One transaction for both statements: a snapshot of the scene that is written meanwhile deletes records.
   ASSIGN_OR_RETURN(const EnginePool::Lease lease, begin_read());
   EngineConnection& connection = *lease;
@@ -326,7 +361,7 @@ absl::Status PostgresLog::read(SceneKey key, uint64_t from, RecordSink sink) con
   const EngineRows& found = connection.results()[0];
   if (found.empty()) return scene_not_stored(key);
   ASSIGN_OR_RETURN(const StoredSceneRow row, scene_row(found, 0));
-  const uint64_t last = found.number(0, kSceneColumns);
+  const uint64_t log_end = found.number(0, kSceneColumns), last = std::min(log_end, until);
   const uint64_t last_chain = found.number(0, kSceneColumns + 1);
   if (from <= row.snapshot_sequence) return refuse_read_before(row.snapshot_sequence);
   if (from > last) return connection.run("COMMIT", answer_deadline());
@@ -357,7 +392,7 @@ absl::Status PostgresLog::read(SceneKey key, uint64_t from, RecordSink sink) con
                           return sink(record);
                         }));
   if (at != last) return damaged("scene", row.name, absl::StrCat("record ", at + 1, " is missing"));
-  if (chain != last_chain && !planted(PlantedBug::kChainNotCompared))
+  if (last == log_end && chain != last_chain && !planted(PlantedBug::kChainNotCompared))
     return damaged("scene", row.name, absl::StrCat("record ", last, " is not the one that was appended"));
   return connection.run("COMMIT", answer_deadline());
 }

@@ -15,9 +15,11 @@
 #ifndef LOCUS_SERVER_STORAGE_POSTGRES_LOG_H_
 #define LOCUS_SERVER_STORAGE_POSTGRES_LOG_H_
 
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -28,6 +30,7 @@
 #include "absl/functional/function_ref.h"
 #include "absl/status/statusor.h"
 #include "core/base/mutex.h"
+#include "core/scene/log/record_codec.h"
 #include "core/scene/log/update_log.h"
 #include "server/storage/postgres/append_queue.h"
 #include "server/storage/postgres/engine_pool.h"
@@ -35,6 +38,25 @@
 #include "server/storage/postgres/tables.h"
 
 namespace locus::server {
+
+// A scene as the catalogue of the cluster has it.
+struct CatalogueScene {
+  SceneKey key = 0;
+  std::string name;
+  std::string spec;
+  uint64_t epoch = 0;
+  uint64_t member = 0;  // leader; 0: none
+  uint64_t token = 0;
+  uint64_t last_sequence = 0;
+  absl::Status damage;  // not OK (DATA_LOSS): the scene must not be served
+};
+
+// Instances of one mesh that a scene places.
+struct MeshUse {
+  std::string name;
+  std::array<uint8_t, 32> sha256 = {};
+  uint64_t instances = 0;
+};
 
 struct PostgresOptions {
   std::string url;      // see EngineAddress::parse()
@@ -44,6 +66,16 @@ struct PostgresOptions {
   std::chrono::milliseconds connect_wait{2'000};  // longest wait for one host to accept a connection
   std::chrono::milliseconds answer_wait{3'000};   // longest wait for an answer before another host is tried
   std::chrono::milliseconds append_wait{10'000};  // longest wait for the outcome of a change
+
+  // False: stored_scenes() and stored_meshes() stay empty, because a cluster has more than one daemon may read.
+  bool list_catalogue = true;
+  uint64_t apply_version = kApplyVersion;  // version of the records that this daemon writes and replays
+
+  // Called without locks, by the thread of the call that found it out. `on_fenced`: another daemon leads the scene
+  // instead of the leadership with `token`; called once for each leadership, if a member returned ABORTED for this
+  // reason. `on_token`: this daemon leads on with the token `now`, because it had to remove a lost append.
+  std::function<void(SceneKey, uint64_t token)> on_fenced;
+  std::function<void(SceneKey, uint64_t before, uint64_t now)> on_token;
 };
 
 class PostgresLog final : public UpdateLog {
@@ -66,11 +98,19 @@ class PostgresLog final : public UpdateLog {
   // call that fails as UNAVAILABLE may be repeated with the same token.
   absl::StatusOr<StoredScene> take_over(SceneKey scene, uint64_t token) LOCUS_EXCLUDES(mutex_);
   // Begins to append as the leader that the engine already has: `member`, with the token `token`. ABORTED if leader or
-  // token differ.
+  // token differ; FAILED_PRECONDITION if the scene has records after its snapshot that another version of locusd wrote.
   absl::StatusOr<StoredScene> begin_leading(SceneKey scene, uint64_t member, uint64_t token) LOCUS_EXCLUDES(mutex_);
   // Returns the token with which this daemon appends. It is higher than that of the takeover if the outcome of an
   // append was unknown and its records had to be removed.
   absl::StatusOr<uint64_t> token_of(SceneKey scene) const LOCUS_EXCLUDES(mutex_);
+
+  // Return scenes of the cluster as they are now, also of other leaders: the one of this name; at most `limit` in order of
+  // their names, after the name `after`.
+  absl::StatusOr<std::optional<CatalogueScene>> find_catalogued(absl::string_view name) const;
+  absl::StatusOr<std::vector<CatalogueScene>> list_catalogued(absl::string_view after, size_t limit) const;
+  // Return meshes as they are now, like the functions above.
+  absl::StatusOr<std::optional<StoredMesh>> find_stored_mesh(absl::string_view name) const;
+  absl::StatusOr<std::vector<StoredMesh>> list_stored_meshes(absl::string_view after, size_t limit) const;
 
   const std::vector<StoredScene>& stored_scenes() const override { return stored_scenes_; }
   const std::vector<StoredMesh>& stored_meshes() const override { return stored_meshes_; }
@@ -79,13 +119,19 @@ class PostgresLog final : public UpdateLog {
 
   absl::StatusOr<SceneKey> create_scene(absl::string_view name, absl::string_view spec, uint64_t epoch,
                                         ChunkSource state) override LOCUS_EXCLUDES(mutex_);
+  // Like create_scene(), but the scene has no leader and the token 0, and this daemon does not lead it.
+  absl::StatusOr<SceneKey> create_unled_scene(absl::string_view name, absl::string_view spec, uint64_t epoch,
+                                              ChunkSource state);
   absl::Status delete_scene(SceneKey scene) override LOCUS_EXCLUDES(mutex_);
   absl::Status restart_scene(SceneKey scene, uint64_t epoch) override LOCUS_EXCLUDES(mutex_);
   absl::Status set_scene_spec(SceneKey scene, absl::string_view spec) override LOCUS_EXCLUDES(mutex_);
 
   absl::StatusOr<uint64_t> append(SceneKey scene, absl::Span<const LogEntry> entries, AckLevel level) override
       LOCUS_EXCLUDES(mutex_);
+  // Reads the acknowledged records, also of a scene that this daemon does not lead.
   absl::Status read(SceneKey scene, uint64_t from, RecordSink sink) const override;
+  // Like read(), but ends after the record `until`, or after the last one if that is earlier.
+  absl::Status read_until(SceneKey scene, uint64_t from, uint64_t until, RecordSink sink) const;
   absl::StatusOr<uint64_t> latest(SceneKey scene) const override LOCUS_EXCLUDES(mutex_);
 
   absl::Status write_snapshot(SceneKey scene, uint64_t sequence, ChunkSource state) override LOCUS_EXCLUDES(mutex_);
@@ -93,10 +139,19 @@ class PostgresLog final : public UpdateLog {
 
   absl::Status add_mesh(absl::string_view name, const std::array<uint8_t, 32>& sha256, ChunkSource content,
                         ChunkSource parts) override LOCUS_EXCLUDES(mutex_);
+  // FAILED_PRECONDITION, with the reason IN_USE, if a scene has claimed the mesh.
   absl::Status delete_mesh(absl::string_view name) override;
   absl::Status set_mesh_graces(absl::Span<const std::string> names, uint32_t grace_s) override;
   absl::Status read_mesh(const std::array<uint8_t, 32>& sha256, ChunkSink sink) const override LOCUS_EXCLUDES(mutex_);
   absl::Status read_parts(absl::string_view name, ChunkSink sink) const override;
+  // Claims meshes for a scene that this daemon leads, so that nobody deletes them: call it before a change that places
+  // them is appended. Adds `instances` to the number of each. NOT_FOUND, naming the mesh, if no mesh of this name and
+  // content is stored; nothing is claimed then. After UNAVAILABLE the claim may have happened, which only makes the
+  // numbers too large until set_mesh_uses().
+  absl::Status claim_meshes(SceneKey scene, absl::Span<const MeshUse> uses) LOCUS_EXCLUDES(mutex_);
+  // Replaces all claims of a scene by the exact numbers; a mesh without instances is not claimed any more. Call it
+  // while no claimed change waits for its append. Errors: those of claim_meshes().
+  absl::Status set_mesh_uses(SceneKey scene, absl::Span<const MeshUse> uses) LOCUS_EXCLUDES(mutex_);
   // The topologies of trees are not stored: they can be computed, and each daemon would send them all through the
   // engine.
   void store_topology(const std::array<uint8_t, 32>&, absl::string_view) override {}
@@ -120,6 +175,8 @@ class PostgresLog final : public UpdateLog {
     // append removes the records up to it.
     uint64_t possibly_last LOCUS_GUARDED_BY(writing) = 0;
     bool fenced LOCUS_GUARDED_BY(writing) = false;
+    bool fence_unreported LOCUS_GUARDED_BY(writing) = false;
+    uint64_t reported_token LOCUS_GUARDED_BY(writing) = 0;
     absl::Status damage LOCUS_GUARDED_BY(writing);  // not OK: the scene can only be deleted
     std::atomic<uint64_t> known_last = 0;           // equals `last`, for readers that do not wait for an append
   };
@@ -127,8 +184,24 @@ class PostgresLog final : public UpdateLog {
   using Change = absl::FunctionRef<absl::Status(EngineConnection&)>;
   using WasDone = absl::FunctionRef<absl::StatusOr<bool>(EngineConnection&)>;
 
+  // Reports a fence or another token when it goes out of scope: declare it before the lock of `led.writing`.
+  class Report {
+   public:
+    Report(const PostgresLog& log, Led& led) : log_(log), led_(led) {}
+    ~Report() { log_.report(led_); }
+    Report(const Report&) = delete;
+    Report& operator=(const Report&) = delete;
+
+   private:
+    const PostgresLog& log_;
+    Led& led_;
+  };
+
   PostgresLog(const PostgresOptions& options, EngineAddress address);
   absl::Status list_stored();
+  // Calls options_.on_token and options_.on_fenced if there is news.
+  void report(Led& led) const LOCUS_EXCLUDES(led.writing);
+  static void set_fenced(Led& led) LOCUS_REQUIRES(led.writing);
 
   absl::StatusOr<LedPtr> led(SceneKey scene) const LOCUS_EXCLUDES(mutex_);
   // Ends an earlier leadership of this daemon: waits for an append in progress and refuses later ones, because only the
@@ -146,6 +219,10 @@ class PostgresLog final : public UpdateLog {
   // Returns a connection in a transaction that reads one state of all tables. Tries hosts until one has committed a
   // barrier, so that the state is not older than this call.
   absl::StatusOr<EnginePool::Lease> begin_read() const;
+  // Runs one statement that reads, and a barrier, on a connection for short calls, and calls `use` with the rows. Tries
+  // hosts until one has answered.
+  absl::Status read_committed(const char* sql, const SqlParameters& parameters,
+                              absl::FunctionRef<void(const EngineRows&)> use) const;
   // Return the deadline of one answer, and that of a change with all of its attempts. Sending `bytes` may take a second
   // for each 8 MiB in addition.
   Deadline answer_deadline(uint64_t bytes = 0) const {
@@ -164,9 +241,13 @@ class PostgresLog final : public UpdateLog {
   // Locks the row of the scene's log in the open transaction and checks that this daemon leads the scene. Otherwise
   // returns ABORTED and sets `fenced`, which holds if transact() returns ABORTED, too.
   absl::Status guard(EngineConnection& connection, Led& led, bool& fenced) const LOCUS_REQUIRES(led.writing);
+  // Stores a new scene, whose key is set in `row`.
+  absl::Status store_scene(StoredSceneRow& row, uint64_t leader, uint64_t token, ChunkSource state) const;
   absl::Status send_row(EngineConnection& connection, const StoredSceneRow& row) const;
   // Changes the row of a scene that this daemon leads.
   absl::Status change_row(SceneKey scene, absl::FunctionRef<void(StoredSceneRow&)> change) LOCUS_EXCLUDES(mutex_);
+  enum class UseChange : uint8_t { kAdd, kReplace };
+  absl::Status change_uses(SceneKey scene, absl::Span<const MeshUse> uses, UseChange change) LOCUS_EXCLUDES(mutex_);
 
   void commit_group(absl::Span<Append* const> group) const;
   // Sends the appends in one transaction and sets their outcomes. Those that stay kNotWritten may be sent again.

@@ -21,50 +21,7 @@ constexpr const char* kSnapshotChunkSql =
     "INSERT INTO locus.snapshot_chunk (scene, snapshot, number, checksum, bytes)"
     " VALUES ($1::bigint, $2::bigint, $3::bigint, $4::bigint, $5::bytea)";
 
-StoredScene stored_scene(const EngineRows& rows, size_t row) {
-  StoredScene stored;
-  stored.key = rows.number(row, 0);
-  stored.name = std::string(rows.bytes(row, 1));
-  const absl::StatusOr<StoredSceneRow> found = scene_row(rows, row);
-  stored.damage = found.status();
-  if (found.ok()) {
-    stored.spec = found->spec;
-    stored.epoch = found->epoch;
-    stored.snapshot_sequence = found->snapshot_sequence;
-  }
-  stored.last_sequence = rows.number(row, kSceneColumns);
-  stored.log_bytes = rows.number(row, kSceneColumns + 1);
-  return stored;
-}
-
-// Begins a statement that returns the columns which stored_scene() reads.
-#define LOCUS_STORED_SCENES                                                               \
-  "SELECT " LOCUS_SCENE_COLUMNS                                                           \
-  ", l.last, (SELECT coalesce(sum(octet_length(r.bytes)), 0)::bigint FROM locus.record r" \
-  " WHERE r.scene = s.key), l.chain, l.leader, l.token FROM locus.scene s JOIN locus.scene_log l ON l.scene = s.key "
-
 }  // namespace
-
-absl::Status PostgresLog::list_stored() {
-  ASSIGN_OR_RETURN(const EnginePool::Lease lease, begin_read());
-  lease->add(LOCUS_STORED_SCENES "ORDER BY s.name COLLATE \"C\"");
-  lease->add("SELECT " LOCUS_MESH_COLUMNS " FROM locus.mesh m ORDER BY m.name COLLATE \"C\"");
-  lease->add("COMMIT");
-  RETURN_IF_ERROR(lease->run(change_deadline()));
-  const EngineRows& scenes = lease->results()[0];
-  for (size_t row = 0; row < scenes.size(); ++row) stored_scenes_.push_back(stored_scene(scenes, row));
-  const EngineRows& meshes = lease->results()[1];
-  for (size_t row = 0; row < meshes.size(); ++row) {
-    const absl::StatusOr<StoredMeshRow> found = mesh_row(meshes, row);
-    StoredMesh& stored = stored_meshes_.emplace_back();
-    stored.name = std::string(meshes.bytes(row, 0));
-    stored.damage = found.status();
-    if (!found.ok()) continue;
-    stored.sha256 = found->sha256;
-    stored.grace_s = found->grace_s;
-  }
-  return absl::OkStatus();
-}
 
 absl::Status PostgresLog::transact(EnginePool::Use use, Change change, WasDone was_done) const {
   const Deadline deadline = change_deadline();
@@ -157,9 +114,16 @@ absl::StatusOr<StoredScene> PostgresLog::begin_leading(SceneKey scene, uint64_t 
   const EngineRows& found = lease->results()[0];
   if (found.empty()) return scene_not_stored(scene);
   StoredScene stored = stored_scene(found, 0);
+  const absl::StatusOr<StoredSceneRow> row = scene_row(found, 0);
   if (found.number(0, kSceneColumns + 3) != member || found.number(0, kSceneColumns + 4) != token)
     return refuse_fenced(stored.name);
+  const bool other_version = row.ok() && row->apply_version != options_.apply_version;
+  if (other_version && stored.last_sequence > stored.snapshot_sequence)
+    return refuse_apply_version(stored.name, row->apply_version, options_.apply_version);
   lead(stored, member, token, found.number(0, kSceneColumns + 2), retired.token == token ? retired.possibly_last : 0);
+  // The row says of which version the records after the snapshot are, so it is changed before the first of them.
+  if (other_version)
+    RETURN_IF_ERROR(change_row(scene, [this](StoredSceneRow& own) { own.apply_version = options_.apply_version; }));
   return stored;
 }
 
@@ -229,7 +193,27 @@ absl::StatusOr<SceneKey> PostgresLog::create_scene(absl::string_view name, absl:
   row.name = std::string(name);
   row.spec = std::string(spec);
   row.epoch = epoch;
-  row.apply_version = kApplyVersion;
+  RETURN_IF_ERROR(store_scene(row, options_.member, 1, state));
+  StoredScene stored;
+  stored.key = row.key;
+  stored.name = row.name;
+  stored.epoch = epoch;
+  lead(stored, options_.member, 1, row.snapshot_chain, 0);
+  return row.key;
+}
+
+absl::StatusOr<SceneKey> PostgresLog::create_unled_scene(absl::string_view name, absl::string_view spec, uint64_t epoch,
+                                                         ChunkSource state) {
+  StoredSceneRow row;
+  row.name = std::string(name);
+  row.spec = std::string(spec);
+  row.epoch = epoch;
+  RETURN_IF_ERROR(store_scene(row, 0, 0, state));
+  return row.key;
+}
+
+absl::Status PostgresLog::store_scene(StoredSceneRow& row, uint64_t leader, uint64_t token, ChunkSource state) const {
+  row.apply_version = options_.apply_version;
   row.snapshot = random_id();
   // Adds a row without a summary of the snapshot, which send_row() then completes. Returns its key; nullopt if the name
   // is taken. Waits for a transaction that has added the name and is not committed.
@@ -246,14 +230,14 @@ absl::StatusOr<SceneKey> PostgresLog::create_scene(absl::string_view name, absl:
   };
   const auto create = [&](EngineConnection& connection) -> absl::Status {
     ASSIGN_OR_RETURN(const std::optional<SceneKey> key, add_name(connection));
-    if (!key) return scene_already_stored(name);
+    if (!key) return scene_already_stored(row.name);
     row.key = *key;
     row.snapshot_chain = first_chain(row.key);
     ASSIGN_OR_RETURN(row.chunks, send_chunks(connection, kSnapshotChunkSql, row.key, row.snapshot, state));
     connection.add(
         "INSERT INTO locus.scene_log (scene, leader, token, last, chain)"
-        " VALUES ($1::bigint, $2::bigint, 1, 0, $3::bigint)",
-        SqlParameters().number(row.key).number(options_.member).number(row.snapshot_chain));
+        " VALUES ($1::bigint, $2::bigint, $3::bigint, 0, $4::bigint)",
+        SqlParameters().number(row.key).number(leader).number(token).number(row.snapshot_chain));
     return send_row(connection, row);
   };
   const auto was_done = [&](EngineConnection& connection) -> absl::StatusOr<bool> {
@@ -269,18 +253,13 @@ absl::StatusOr<SceneKey> PostgresLog::create_scene(absl::string_view name, absl:
     RETURN_IF_ERROR(run_barrier(connection));
     return !connection.results()[0].empty();
   };
-  RETURN_IF_ERROR(transact(EnginePool::Use::kOther, create, was_done));
-  StoredScene stored;
-  stored.key = row.key;
-  stored.name = row.name;
-  stored.epoch = epoch;
-  lead(stored, options_.member, 1, row.snapshot_chain, 0);
-  return row.key;
+  return transact(EnginePool::Use::kOther, create, was_done);
 }
 
 absl::Status PostgresLog::delete_scene(SceneKey key) {
   ASSIGN_OR_RETURN(const LedPtr state, led(key));
   Led& scene = *state;
+  const Report report(*this, scene);
   MutexLock writing(scene.writing);
   bool fenced = false;
   const auto remove = [&](EngineConnection& connection) LOCUS_REQUIRES(scene.writing) -> absl::Status {
@@ -296,7 +275,7 @@ absl::Status PostgresLog::delete_scene(SceneKey key) {
     return connection.results()[0].empty();
   };
   absl::Status status = transact(EnginePool::Use::kUrgent, remove, removed);
-  if (absl::IsAborted(status)) scene.fenced = fenced;
+  if (absl::IsAborted(status) && fenced) set_fenced(scene);
   if (!status.ok() && !absl::IsNotFound(status)) return status;
   MutexLock lock(mutex_);
   led_.erase(key);
@@ -306,6 +285,7 @@ absl::Status PostgresLog::delete_scene(SceneKey key) {
 absl::Status PostgresLog::change_row(SceneKey key, absl::FunctionRef<void(StoredSceneRow&)> change) {
   ASSIGN_OR_RETURN(const LedPtr state, led(key));
   Led& scene = *state;
+  const Report report(*this, scene);
   MutexLock writing(scene.writing);
   StoredSceneRow row;
   bool fenced = false;
@@ -325,7 +305,7 @@ absl::Status PostgresLog::change_row(SceneKey key, absl::FunctionRef<void(Stored
     return !found.empty() && found.number(0, 0) == checksum_of(row);
   };
   const absl::Status status = transact(EnginePool::Use::kUrgent, update, was_done);
-  if (absl::IsAborted(status)) scene.fenced = fenced;
+  if (absl::IsAborted(status) && fenced) set_fenced(scene);
   RETURN_IF_ERROR(status);
   scene.epoch = row.epoch;
   return absl::OkStatus();
@@ -376,7 +356,7 @@ absl::Status PostgresLog::write_snapshot(SceneKey key, uint64_t sequence, ChunkS
     row.snapshot = id;
     row.snapshot_sequence = sequence;
     row.chunks = chunks;
-    row.apply_version = kApplyVersion;
+    row.apply_version = options_.apply_version;
     RETURN_IF_ERROR(send_row(connection, row));
     connection.add("DELETE FROM locus.snapshot_chunk WHERE scene = $1::bigint AND snapshot = $2::bigint",
                    SqlParameters().number(key).number(before.snapshot));
@@ -392,8 +372,9 @@ absl::Status PostgresLog::write_snapshot(SceneKey key, uint64_t sequence, ChunkS
   };
   absl::Status status = transact(EnginePool::Use::kOther, write, written);
   if (absl::IsAborted(status) && fenced) {
+    const Report report(*this, scene);
     MutexLock writing(scene.writing);
-    scene.fenced = true;
+    set_fenced(scene);
   }
   return status;
 }

@@ -116,6 +116,12 @@ absl::Status PostgresLog::delete_mesh(absl::string_view name) {
     if (found.empty()) return mesh_not_stored(name);
     const std::string sha256(found.bytes(0, 0));
     const uint64_t content = found.number(0, 1), parts = found.number(0, 2);
+    // A claim that is not committed yet waits for the lock, or this transaction has waited for it.
+    connection.add("SELECT count(*), coalesce(sum(instances), 0)::bigint FROM locus.scene_mesh WHERE name = $1::text",
+                   SqlParameters().text(name));
+    RETURN_IF_ERROR(connection.run(answer_deadline()));
+    const EngineRows& uses = connection.results()[0];
+    if (uses.number(0, 0) > 0) return refuse_mesh_in_use(name, uses.number(0, 1));
     connection.add("DELETE FROM locus.mesh WHERE name = $1::text", SqlParameters().text(name));
     connection.add("DELETE FROM locus.mesh_chunk WHERE content = $1::bigint", SqlParameters().number(parts));
     connection.add(

@@ -50,6 +50,34 @@ absl::StatusOr<StoredMeshRow> mesh_row(const EngineRows& rows, size_t row) {
   return found;
 }
 
+StoredScene stored_scene(const EngineRows& rows, size_t row) {
+  StoredScene stored;
+  stored.key = rows.number(row, 0);
+  stored.name = std::string(rows.bytes(row, 1));
+  const absl::StatusOr<StoredSceneRow> found = scene_row(rows, row);
+  stored.damage = found.status();
+  if (found.ok()) {
+    stored.spec = found->spec;
+    stored.epoch = found->epoch;
+    stored.snapshot_sequence = found->snapshot_sequence;
+  }
+  stored.last_sequence = rows.number(row, kSceneColumns);
+  stored.log_bytes = rows.number(row, kSceneColumns + 1);
+  return stored;
+}
+
+StoredMesh stored_mesh(const EngineRows& rows, size_t row) {
+  StoredMesh stored;
+  stored.name = std::string(rows.bytes(row, 0));
+  const absl::StatusOr<StoredMeshRow> found = mesh_row(rows, row);
+  stored.damage = found.status();
+  if (found.ok()) {
+    stored.sha256 = found->sha256;
+    stored.grace_s = found->grace_s;
+  }
+  return stored;
+}
+
 uint64_t checksum_of(const StoredSceneRow& row) {
   RowWriter out;
   out.u64(row.key).string(row.name).string(row.spec).u64(row.epoch).u64(row.apply_version);

@@ -40,6 +40,11 @@ struct StoredMeshRow {
   " s.chunk_bytes, s.digest, s.checksum"
 #define LOCUS_MESH_COLUMNS "m.name, m.sha256, m.grace_s, m.content, m.chunks, m.chunk_bytes, m.digest, m.checksum"
 inline constexpr int kSceneColumns = 12;
+// Begins a statement that returns the columns which stored_scene() reads, and then chain, leader and token.
+#define LOCUS_STORED_SCENES                                                               \
+  "SELECT " LOCUS_SCENE_COLUMNS                                                           \
+  ", l.last, (SELECT coalesce(sum(octet_length(r.bytes)), 0)::bigint FROM locus.record r" \
+  " WHERE r.scene = s.key), l.chain, l.leader, l.token FROM locus.scene s JOIN locus.scene_log l ON l.scene = s.key "
 
 // Returns DATA_LOSS for the scene or mesh `name`; `kind` is "scene" or "mesh".
 absl::Status damaged(absl::string_view kind, absl::string_view name, absl::string_view what);
@@ -47,6 +52,10 @@ absl::Status damaged(absl::string_view kind, absl::string_view name, absl::strin
 // Decode one row. DATA_LOSS, with the name, if its checksum is wrong.
 absl::StatusOr<StoredSceneRow> scene_row(const EngineRows& rows, size_t row);
 absl::StatusOr<StoredMeshRow> mesh_row(const EngineRows& rows, size_t row);
+
+// Decode one row for the users of the log. A damaged row has its key and name, and `damage`.
+StoredScene stored_scene(const EngineRows& rows, size_t row);
+StoredMesh stored_mesh(const EngineRows& rows, size_t row);
 
 uint64_t checksum_of(const StoredSceneRow& row);
 uint64_t checksum_of(const StoredMeshRow& row);

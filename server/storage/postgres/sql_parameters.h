@@ -1,6 +1,6 @@
 // Parameters of an SQL statement in PostgreSQL's binary format: big-endian integers of 64 bits, texts, bytes, and
-// arrays of integers and of bytes. Texts and bytes are borrowed: they must outlive the statement's sending. Unsigned
-// numbers are stored as the signed number of the same bits. One thread at a time.
+// arrays of integers, texts and bytes. Texts and bytes are borrowed: they must outlive the statement's sending.
+// Unsigned numbers are stored as the signed number of the same bits. One thread at a time.
 #ifndef LOCUS_SERVER_STORAGE_POSTGRES_SQL_PARAMETERS_H_
 #define LOCUS_SERVER_STORAGE_POSTGRES_SQL_PARAMETERS_H_
 
@@ -36,12 +36,9 @@ class SqlParameters {
     for (const uint64_t value : values) out.big_u32(sizeof(value)).big_u64(value);
     return own(out.take());
   }
-  // Copies the values, because an array is one parameter.
-  SqlParameters& list_of_bytes(absl::Span<const absl::string_view> values) {
-    RowWriter out = array_head(kBytea, values.size());
-    for (const absl::string_view value : values) out.big_u32(static_cast<uint32_t>(value.size())).bytes(value);
-    return own(out.take());
-  }
+  // Copy the values, because an array is one parameter.
+  SqlParameters& list_of_bytes(absl::Span<const absl::string_view> values) { return list(kBytea, values); }
+  SqlParameters& list_of_texts(absl::Span<const absl::string_view> values) { return list(kText, values); }
 
   int count() const { return static_cast<int>(values_.size()); }
   const char* const* values() const { return values_.data(); }
@@ -52,12 +49,18 @@ class SqlParameters {
   // Numbers by which PostgreSQL's catalogue names the types of array elements.
   static constexpr uint32_t kBytea = 17;
   static constexpr uint32_t kBigint = 20;
+  static constexpr uint32_t kText = 25;
 
   static RowWriter array_head(uint32_t element_type, size_t size) {
     RowWriter out;
     out.big_u32(size == 0 ? 0 : 1).big_u32(0).big_u32(element_type);    // dimensions, no nulls, type
     if (size > 0) out.big_u32(static_cast<uint32_t>(size)).big_u32(1);  // length and first index of the dimension
     return out;
+  }
+  SqlParameters& list(uint32_t element_type, absl::Span<const absl::string_view> values) {
+    RowWriter out = array_head(element_type, values.size());
+    for (const absl::string_view value : values) out.big_u32(static_cast<uint32_t>(value.size())).bytes(value);
+    return own(out.take());
   }
   SqlParameters& own(std::string value) {
     owned_.push_back(std::move(value));

@@ -12,7 +12,8 @@ namespace {
 constexpr const char* kTables[] = {
     "CREATE SCHEMA locus",
     "CREATE TABLE locus.format (number bigint NOT NULL)",
-    "CREATE TABLE locus.scene (key bigint GENERATED ALWAYS AS IDENTITY PRIMARY KEY, name text NOT NULL UNIQUE,"
+    "CREATE TABLE locus.scene (key bigint GENERATED ALWAYS AS IDENTITY PRIMARY KEY, name text COLLATE \"C\" NOT NULL "
+    "UNIQUE,"
     " spec bytea NOT NULL, epoch bigint NOT NULL, apply_version bigint NOT NULL, snapshot bigint NOT NULL,"
     " snapshot_sequence bigint NOT NULL, snapshot_chain bigint NOT NULL, chunks bigint NOT NULL,"
     " chunk_bytes bigint NOT NULL, digest bigint NOT NULL, checksum bigint NOT NULL)",
@@ -36,10 +37,13 @@ constexpr const char* kTables[] = {
     "ALTER TABLE locus.snapshot_chunk ALTER COLUMN bytes SET STORAGE EXTERNAL",
     "CREATE TABLE locus.mesh_content (sha256 bytea PRIMARY KEY, content bigint NOT NULL, chunks bigint NOT NULL,"
     " chunk_bytes bigint NOT NULL, digest bigint NOT NULL)",
-    "CREATE TABLE locus.mesh (name text PRIMARY KEY, sha256 bytea NOT NULL REFERENCES locus.mesh_content,"
+    "CREATE TABLE locus.mesh (name text COLLATE \"C\" PRIMARY KEY, sha256 bytea NOT NULL REFERENCES locus.mesh_content,"
     " grace_s bigint NOT NULL, content bigint NOT NULL, chunks bigint NOT NULL, chunk_bytes bigint NOT NULL,"
     " digest bigint NOT NULL, checksum bigint NOT NULL)",
     "CREATE INDEX mesh_of_content ON locus.mesh (sha256)",
+    "CREATE TABLE locus.scene_mesh (scene bigint NOT NULL REFERENCES locus.scene ON DELETE CASCADE,"
+    " name text COLLATE \"C\" NOT NULL REFERENCES locus.mesh, instances bigint NOT NULL, PRIMARY KEY (scene, name))",
+    "CREATE INDEX scene_of_mesh ON locus.scene_mesh (name)",
     "CREATE TABLE locus.mesh_chunk (content bigint NOT NULL, number bigint NOT NULL, checksum bigint NOT NULL,"
     " bytes bytea NOT NULL, PRIMARY KEY (content, number))",
     "ALTER TABLE locus.mesh_chunk ALTER COLUMN bytes SET STORAGE EXTERNAL",

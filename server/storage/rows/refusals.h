@@ -43,6 +43,22 @@ inline absl::Status mesh_already_stored(absl::string_view name) {
       "name", absl::StrCat("a mesh '", name, "' of other content is stored already: delete it or choose another name"));
 }
 
+// Returns NOT_FOUND for a mesh that is not stored with the content that is wanted.
+inline absl::Status mesh_content_not_stored(absl::string_view name) {
+  return not_stored(absl::StrCat("the log has no mesh '", name, "' of this content: it was deleted, or replaced"));
+}
+// Returns FAILED_PRECONDITION for a mesh that cannot be deleted because scenes place `instances` instances of it.
+inline absl::Status refuse_mesh_in_use(absl::string_view name, uint64_t instances) {
+  Refusal refusal;
+  refusal.reason = Reason::kInUse;
+  refusal.field = "mesh";
+  refusal.asked = static_cast<double>(instances);
+  return refuse(absl::StatusCode::kFailedPrecondition,
+                instances > 0 ? absl::StrCat("mesh ", name, " is used by ", instances, " instances; remove them first")
+                              : absl::StrCat("mesh ", name, " is being placed; try again once that is done"),
+                refusal);
+}
+
 // Returns FAILED_PRECONDITION for records of the epoch `asked` while the scene `name` is in the epoch `epoch`.
 inline absl::Status refuse_epoch(absl::string_view name, uint64_t epoch, uint64_t asked) {
   Refusal refusal;
@@ -70,6 +86,13 @@ inline absl::Status refuse_snapshot_at(uint64_t sequence, uint64_t first, uint64
 inline absl::Status refuse_chunk(size_t bytes) {
   return refuse_limit("state", "chunk_bytes", static_cast<double>(UpdateLog::kMaxChunkBytes),
                       static_cast<double>(bytes));
+}
+
+// Returns FAILED_PRECONDITION for the scene `name`, whose records another version of locusd has written.
+inline absl::Status refuse_apply_version(absl::string_view name, uint64_t stored, uint64_t own) {
+  return absl::FailedPreconditionError(absl::StrCat(
+      "scene '", name, "' has records of version ", stored, ", and this locusd replays only those of version ", own,
+      ": start a locusd of the version that wrote them and drain it, which leaves nothing to replay"));
 }
 
 // Returns ABORTED for the scene `name`, which another daemon leads.

@@ -258,6 +258,11 @@ TEST_F(PostgresLogFaultTest, AnAppendThatTheEngineNeverAnsweredIsRemovedBeforeTh
   PostgresOptions options = engine_->options();
   options.answer_wait = std::chrono::milliseconds(200);
   options.append_wait = std::chrono::milliseconds(800);
+  std::vector<std::string> tokens;
+  options.on_token = [&](SceneKey of, uint64_t before, uint64_t now) {
+    tokens.push_back(absl::StrCat(of, ":", before, "->", now, " at ", log_->latest(of).value()));
+  };
+  options.on_fenced = [](SceneKey, uint64_t) { ADD_FAILURE() << "this daemon still leads"; };
   log_ = open_and_lead(options);
   sql("ALTER SYSTEM SET synchronous_standby_names = 'nobody'");
   sql("SELECT pg_reload_conf()");
@@ -272,7 +277,9 @@ TEST_F(PostgresLogFaultTest, AnAppendThatTheEngineNeverAnsweredIsRemovedBeforeTh
   for (int i = 0; i < 500 && engine_->query("SELECT last FROM locus.scene_log") != "4"; ++i)
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   EXPECT_EQ(engine_->query("SELECT last FROM locus.scene_log"), "4") << "the engine has committed it by now";
+  EXPECT_TRUE(tokens.empty());
   ASSERT_EQ(append_records(*log_, scene, 7, 3), absl::OkStatus());
+  EXPECT_EQ(tokens, std::vector<std::string>{"1:2->3 at 2"}) << "reported before the next record is written";
   expect_records(scene, 1, 5);
 }
 
