@@ -104,8 +104,8 @@ class PostgresLog final : public UpdateLog {
   // append was unknown and its records had to be removed.
   absl::StatusOr<uint64_t> token_of(SceneKey scene) const LOCUS_EXCLUDES(mutex_);
 
-  // Return scenes of the cluster as they are now, also of other leaders: the one of this name; at most `limit` in order of
-  // their names, after the name `after`.
+  // Return scenes of the cluster as they are now, also of other leaders: the one of this name; at most `limit` in order
+  // of their names, after the name `after`.
   absl::StatusOr<std::optional<CatalogueScene>> find_catalogued(absl::string_view name) const;
   absl::StatusOr<std::vector<CatalogueScene>> list_catalogued(absl::string_view after, size_t limit) const;
   // Return meshes as they are now, like the functions above.
