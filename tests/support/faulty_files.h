@@ -74,6 +74,8 @@ class FaultyFiles final : public rocksdb::FileSystemWrapper {
   // of all files fail.
   void fail_syncs(int64_t count) { failing_syncs_ = count; }
   void fail_writes(int64_t count) { failing_writes_ = count; }
+  // Returns the number of writes that will fail.
+  int64_t writes_to_fail() const { return failing_writes_; }
   // If `full` is true, makes every write fail because the disk is full, and GetFreeSpace() return 0, until fill(false).
   void fill(bool full) { full_ = full; }
 
