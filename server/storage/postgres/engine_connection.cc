@@ -1,5 +1,6 @@
 #include "server/storage/postgres/engine_connection.h"
 
+#include <libpq-fe.h>
 #include <poll.h>
 
 #include <algorithm>
@@ -34,6 +35,30 @@ bool is_read_only(const PGresult* result) {
 }
 
 }  // namespace
+
+void EngineRows::Clear::operator()(pg_result* result) const { PQclear(result); }
+
+void EngineConnection::Close::operator()(pg_conn* connection) const { PQfinish(connection); }
+
+size_t EngineRows::size() const { return static_cast<size_t>(PQntuples(result_.get())); }
+
+absl::string_view EngineRows::bytes(size_t row, int column) const {
+  const int at = static_cast<int>(row);
+  return {PQgetvalue(result_.get(), at, column), static_cast<size_t>(PQgetlength(result_.get(), at, column))};
+}
+
+bool EngineRows::is_null(size_t row, int column) const {
+  return PQgetisnull(result_.get(), static_cast<int>(row), column) != 0;
+}
+
+bool EngineConnection::in_transaction() const {
+  const PGTransactionStatusType status = PQtransactionStatus(connection_.get());
+  return !lost_ && !broken_ && (status == PQTRANS_INTRANS || status == PQTRANS_INERROR);
+}
+
+bool EngineConnection::usable() const {
+  return !lost_ && !broken_ && PQtransactionStatus(connection_.get()) == PQTRANS_IDLE;
+}
 
 uint64_t EngineRows::changed() const {
   uint64_t count = 0;

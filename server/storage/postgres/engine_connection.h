@@ -11,8 +11,6 @@
 #ifndef LOCUS_SERVER_STORAGE_POSTGRES_ENGINE_CONNECTION_H_
 #define LOCUS_SERVER_STORAGE_POSTGRES_ENGINE_CONNECTION_H_
 
-#include <libpq-fe.h>
-
 #include <chrono>
 #include <cstdint>
 #include <memory>
@@ -25,6 +23,10 @@
 #include "server/storage/postgres/engine_address.h"
 #include "server/storage/postgres/sql_parameters.h"
 
+// Declared by libpq-fe.h, which only the source file includes, so that includers of this header do not need libpq.
+struct pg_conn;
+struct pg_result;
+
 namespace locus::server {
 
 using Deadline = std::chrono::steady_clock::time_point;
@@ -32,22 +34,23 @@ using Deadline = std::chrono::steady_clock::time_point;
 // EngineRows that a statement returned. All columns are bigint, text or bytea, in binary format.
 class EngineRows {
  public:
-  explicit EngineRows(PGresult* result) : result_(result, &PQclear) {}
+  explicit EngineRows(pg_result* result) : result_(result) {}
 
-  size_t size() const { return static_cast<size_t>(PQntuples(result_.get())); }
+  size_t size() const;
   bool empty() const { return size() == 0; }
   uint64_t number(size_t row, int column) const { return RowReader(bytes(row, column)).big_u64(); }
   // Returns a text or bytes; they are valid as long as this object.
-  absl::string_view bytes(size_t row, int column) const {
-    const int at = static_cast<int>(row);
-    return {PQgetvalue(result_.get(), at, column), static_cast<size_t>(PQgetlength(result_.get(), at, column))};
-  }
-  bool is_null(size_t row, int column) const { return PQgetisnull(result_.get(), static_cast<int>(row), column) != 0; }
+  absl::string_view bytes(size_t row, int column) const;
+  bool is_null(size_t row, int column) const;
   // Returns the number of rows that the statement inserted, updated or deleted.
   uint64_t changed() const;
 
  private:
-  std::unique_ptr<PGresult, decltype(&PQclear)> result_;
+  struct Clear {
+    void operator()(pg_result* result) const;
+  };
+
+  std::unique_ptr<pg_result, Clear> result_;
 };
 
 class EngineConnection {
@@ -94,30 +97,27 @@ class EngineConnection {
 
   // Returns whether the connection may be used for another transaction. A connection with an open transaction may not:
   // when it is closed, the engine undoes the transaction.
-  bool in_transaction() const {
-    const PGTransactionStatusType status = PQtransactionStatus(connection_.get());
-    return !lost_ && !broken_ && (status == PQTRANS_INTRANS || status == PQTRANS_INERROR);
-  }
-  bool usable() const { return !lost_ && !broken_ && PQtransactionStatus(connection_.get()) == PQTRANS_IDLE; }
+  bool in_transaction() const;
+  bool usable() const;
 
  private:
   struct Close {
-    void operator()(PGconn* connection) const { PQfinish(connection); }
+    void operator()(pg_conn* connection) const;
   };
 
-  EngineConnection(PGconn* connection, size_t host, std::string name)
+  EngineConnection(pg_conn* connection, size_t host, std::string name)
       : connection_(connection), host_(host), name_(std::move(name)) {}
-  static void notice(void* connection, const PGresult* result);
+  static void notice(void* connection, const pg_result* result);
 
   // Waits until the engine has sent something, or until it takes more of what is sent. Fails at `deadline`.
   absl::Status wait(Deadline deadline);
   // Sends everything that was added.
   absl::Status send(Deadline deadline);
   // Returns the next result; null at the end of the results of a statement.
-  absl::StatusOr<PGresult*> next(Deadline deadline);
-  absl::Status error_of(const PGresult* result) const;
+  absl::StatusOr<pg_result*> next(Deadline deadline);
+  absl::Status error_of(const pg_result* result) const;
 
-  const std::unique_ptr<PGconn, Close> connection_;
+  const std::unique_ptr<pg_conn, Close> connection_;
   const size_t host_;
   const std::string name_;
   size_t added_ = 0;        // statements added since the last run()
