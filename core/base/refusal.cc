@@ -7,6 +7,7 @@
 #include "absl/strings/match.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "absl/strings/str_split.h"
 #include "core/base/check.h"
 
@@ -16,12 +17,14 @@ namespace {
 constexpr absl::string_view kPayloadType = "locus/refusal";
 // Separator of the payload's fields: a character that no field path or limit name contains.
 constexpr char kSeparator = '\x1f';
-constexpr size_t kFieldCount = 7;
+constexpr size_t kFieldCount = 9;
+// Separator of the addresses, which contain none.
+constexpr char kAddressSeparator = '\x1e';
 
-constexpr std::array<absl::string_view, 18> kReasonNames = {
-    "UNSPECIFIED",  "NOT_FINITE",      "UNKNOWN_ID", "DUPLICATE_ID",  "COLUMN_LENGTH",  "LIMIT",
-    "OUT_OF_RANGE", "SCENE_RESTARTED", "NOT_SERVED", "NOT_FOUND",     "ALREADY_EXISTS", "DRAINING",
-    "MALFORMED",    "BATCH_GAP",       "IN_USE",     "HASH_MISMATCH", "RECOVERING",     "DAMAGED"};
+constexpr std::array<absl::string_view, 20> kReasonNames = {
+    "UNSPECIFIED",     "NOT_FINITE",    "UNKNOWN_ID", "DUPLICATE_ID",   "COLUMN_LENGTH", "LIMIT",     "OUT_OF_RANGE",
+    "SCENE_RESTARTED", "NOT_SERVED",    "NOT_FOUND",  "ALREADY_EXISTS", "DRAINING",      "MALFORMED", "BATCH_GAP",
+    "IN_USE",          "HASH_MISMATCH", "RECOVERING", "DAMAGED",        "ELSEWHERE",     "NO_LEADER"};
 static_assert(kReasonNames.size() == static_cast<size_t>(kLastReason) + 1 && !kReasonNames.back().empty());
 
 // Formats a value. Integers of up to 2^53 are written without an exponent.
@@ -66,11 +69,14 @@ absl::Status refuse(absl::StatusCode code, absl::string_view message, const Refu
   absl::Status status(code, absl::StrCat(location(refusal), message));
   const std::string index = refusal.index ? absl::StrCat(*refusal.index) : "";
   const std::string separator(1, kSeparator);
-  status.SetPayload(kPayloadType,
-                    absl::Cord(absl::StrCat(static_cast<int>(refusal.reason), separator, refusal.field, separator,
-                                            index, separator, refusal.limit, separator) +
-                               absl::StrCat(formatted(refusal.limit_value), separator, formatted(refusal.asked),
-                                            separator, refusal.retry_after_ms)));
+  status.SetPayload(
+      kPayloadType,
+      absl::Cord(absl::StrCat(static_cast<int>(refusal.reason), separator, refusal.field, separator, index, separator,
+                              refusal.limit, separator) +
+                 absl::StrCat(formatted(refusal.limit_value), separator, formatted(refusal.asked), separator,
+                              refusal.retry_after_ms) +
+                 absl::StrCat(separator, absl::StrJoin(refusal.addresses, absl::string_view(&kAddressSeparator, 1)),
+                              separator, refusal.token)));
   return status;
 }
 
@@ -99,6 +105,14 @@ absl::Status no_scene(absl::string_view name) {
   return refuse(absl::StatusCode::kNotFound, absl::StrCat("no scene is called '", name, "'; create it first"), refusal);
 }
 
+absl::Status no_leader(absl::string_view why, uint32_t retry_after_ms) {
+  Refusal refusal;
+  refusal.reason = Reason::kNoLeader;
+  refusal.field = "scene";
+  refusal.retry_after_ms = retry_after_ms;
+  return refuse(absl::StatusCode::kUnavailable, absl::StrCat(why, "; try again in a moment"), refusal);
+}
+
 std::optional<Refusal> refusal_of(const absl::Status& status) {
   const absl::optional<absl::Cord> payload = status.GetPayload(kPayloadType);
   if (!payload) return std::nullopt;
@@ -114,6 +128,8 @@ std::optional<Refusal> refusal_of(const absl::Status& status) {
   if (!absl::SimpleAtod(fields[4], &refusal.limit_value)) refusal.limit_value = 0;
   if (!absl::SimpleAtod(fields[5], &refusal.asked)) refusal.asked = 0;
   if (!absl::SimpleAtoi(fields[6], &refusal.retry_after_ms)) refusal.retry_after_ms = 0;
+  if (!fields[7].empty()) refusal.addresses = absl::StrSplit(fields[7], kAddressSeparator);
+  if (!absl::SimpleAtoi(fields[8], &refusal.token)) refusal.token = 0;
   return refusal;
 }
 

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/strings/string_view.h"
@@ -33,8 +34,10 @@ enum class Reason : uint8_t {
   kHashMismatch = 15,
   kRecovering = 16,
   kDamaged = 17,
+  kElsewhere = 18,
+  kNoLeader = 19,
 };
-inline constexpr Reason kLastReason = Reason::kDamaged;
+inline constexpr Reason kLastReason = Reason::kNoLeader;
 
 // Returns the name of a reason as in the protocol, such as "NOT_FINITE".
 absl::string_view reason_name(Reason reason);
@@ -46,8 +49,10 @@ struct Refusal {
   std::optional<uint32_t> index;  // index of the item in a repeated field; nullopt = the whole field
   std::string limit;              // name of the exceeded limit; empty = the reason is not a limit
   double limit_value = 0;
-  double asked = 0;             // requested value
-  uint32_t retry_after_ms = 0;  // 0 = repeating the same request does not help
+  double asked = 0;                    // requested value
+  uint32_t retry_after_ms = 0;         // 0 = repeating the same request does not help
+  std::vector<std::string> addresses;  // of the servers that have the scene, for kElsewhere
+  uint64_t token = 0;                  // number of the leadership of the first address
 };
 
 // Returns a status with the code `code` and `refusal` as payload. `message` should state what the caller can do next;
@@ -71,6 +76,10 @@ absl::Status refuse_full(absl::string_view field, absl::string_view limit, doubl
 // Returns NOT_FOUND for the scene `name`. Used in two cases: the scene does not exist, or the caller has no right to
 // see it. The text is the same in both cases, so that the caller cannot find out whether the scene exists.
 absl::Status no_scene(absl::string_view name);
+
+// Returns UNAVAILABLE, kNoLeader: no server leads the scene at present, or this one does not know which one does. `why`
+// is the first part of the message.
+absl::Status no_leader(absl::string_view why, uint32_t retry_after_ms);
 
 // Returns the refusal that refuse() attached to `status`; nullopt if `status` has no refusal.
 std::optional<Refusal> refusal_of(const absl::Status& status);

@@ -15,7 +15,7 @@ constexpr uint32_t kDrainRetryMs = 1000;
 constexpr uint32_t kRecoveryRetryMs = 200;
 
 static_assert(static_cast<int>(kLastReason) == v1::Reason_MAX);
-static_assert(static_cast<int>(Reason::kDamaged) == v1::REASON_DAMAGED);
+static_assert(static_cast<int>(Reason::kNoLeader) == v1::REASON_NO_LEADER);
 static_assert(static_cast<int>(Reason::kHashMismatch) == v1::REASON_HASH_MISMATCH);
 static_assert(static_cast<int>(Reason::kMalformed) == v1::REASON_MALFORMED);
 static_assert(static_cast<int>(Reason::kNotServed) == v1::REASON_NOT_SERVED);
@@ -51,6 +51,8 @@ v1::Error to_error(const absl::Status& status) {
   error.set_limit_value(refusal->limit_value);
   error.set_asked(refusal->asked);
   error.set_retry_after_ms(lengthened(refusal->retry_after_ms));
+  for (const std::string& address : refusal->addresses) error.add_addresses(address);
+  error.set_token(refusal->token);
   return error;
 }
 
