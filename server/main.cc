@@ -32,6 +32,7 @@
 #include "server/rpc/library_logs.h"
 #include "server/scheduling/allocator_use.h"
 #include "server/scheduling/semaphore.h"
+#include "server/services/cluster/cluster_storage.h"
 #include "server/services/server.h"
 #include "server/storage/integrity/check.h"
 #include "server/storage/integrity/repair.h"
@@ -153,6 +154,11 @@ bool write_port_file(const std::string& path, uint16_t port) {
   return written;
 }
 
+std::string storage_of(const ServerConfig& config) {
+  if (!config.cluster.empty()) return "the engine of a cluster";
+  return config.data_dir.empty() ? "memory only: scenes are lost at exit" : config.data_dir;
+}
+
 void log_start(const Server& server, const ServerConfig& config) {
   log(LogLevel::kInfo, "serving",
       {{"addresses", absl::StrJoin(server.addresses(), ",")},
@@ -163,7 +169,7 @@ void log_start(const Server& server, const ServerConfig& config) {
        {"memory_bytes", absl::StrCat(config.memory_limit)},
        {"receive_bytes", absl::StrCat(config.max_receive_bytes)},
        {"streams", absl::StrCat(config.max_streams)},
-       {"storage", config.data_dir.empty() ? "memory only: scenes are lost at exit" : config.data_dir}});
+       {"storage", storage_of(config)}});
   if (config.insecure) log(LogLevel::kWarning, "insecure: connections are neither encrypted nor authenticated");
 }
 
@@ -193,13 +199,18 @@ int run(const ServerConfig& config) {
       return EXIT_FAILURE;
     }
   }
-  // The log is declared before the server, because the server writes to the log until it is destroyed.
+  // The logs are declared before the server, because the server writes to them until it is destroyed.
+  absl::StatusOr<ClusterStorage> cluster = absl::NotFoundError("no cluster");
+  if (!config.cluster.empty()) cluster = open_cluster(config);
   const absl::StatusOr<std::unique_ptr<UpdateLog>> update_log = open_log(config);
-  if (!update_log.ok()) {
-    log(LogLevel::kError, update_log.status().message());
+  const absl::Status opened = config.cluster.empty() ? update_log.status() : cluster.status();
+  if (!opened.ok()) {
+    log(LogLevel::kError, opened.message());
     return EXIT_FAILURE;
   }
-  const absl::StatusOr<std::unique_ptr<Server>> server = Server::start(config, update_log->get(), signals.received());
+  const absl::StatusOr<std::unique_ptr<Server>> server =
+      Server::start(config, cluster.ok() ? cluster->log.get() : update_log->get(), signals.received(),
+                    cluster.ok() ? &*cluster : nullptr);
   if (!server.ok()) {
     const bool stopped = signals.received().load() && absl::IsCancelled(server.status());
     log(stopped ? LogLevel::kInfo : LogLevel::kError, server.status().message());

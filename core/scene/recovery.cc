@@ -177,7 +177,7 @@ absl::StatusOr<SceneWriter> read_snapshot(const UpdateLog& log, SceneKey key, co
 }
 
 absl::StatusOr<ScenePtr> recover(UpdateLog& log, const StoredScene& stored, const FindMesh& find_mesh,
-                                 const RecoveryProgress& progress) {
+                                 const RecoveryProgress& progress, LogUse use) {
   if (!stored.damage.ok()) return stored.damage;
   absl::StatusOr<SceneSpec> spec = decode_spec(stored.spec);
   if (!spec.ok()) return named("specification", spec.status());
@@ -191,8 +191,13 @@ absl::StatusOr<ScenePtr> recover(UpdateLog& log, const StoredScene& stored, cons
   RETURN_IF_ERROR(meshes.check(*writer.statics()));
   writer.end_replay();
   meshes.forget_missing(writer);
-  const AckLevel level = ack_level(spec->durability);
-  const SceneLog on{&log, stored.key, level, {stored.last_sequence, stored.snapshot_sequence, stored.log_bytes}};
+  SceneLog on;
+  if (use == LogUse::kAppend) {
+    on = {&log,
+          stored.key,
+          ack_level(spec->durability),
+          {stored.last_sequence, stored.snapshot_sequence, stored.log_bytes}};
+  }
   return std::make_shared<Scene>(stored.name, *std::move(spec), std::move(writer), on);
 }
 
@@ -212,8 +217,8 @@ MeshPtr restore_mesh(const UpdateLog& log, const StoredMesh& stored, const Trian
 }  // namespace
 
 absl::StatusOr<ScenePtr> recover_scene(UpdateLog& log, const StoredScene& stored, const FindMesh& find_mesh,
-                                       const RecoveryProgress& progress) {
-  absl::StatusOr<ScenePtr> scene = recover(log, stored, find_mesh, progress);
+                                       const RecoveryProgress& progress, LogUse use) {
+  absl::StatusOr<ScenePtr> scene = recover(log, stored, find_mesh, progress, use);
   if (!scene.ok()) return named(absl::StrCat("scene ", stored.name), scene.status());
   return scene;
 }

@@ -22,11 +22,17 @@ namespace locus {
 // and the number of all records to apply.
 using RecoveryProgress = std::function<void(uint64_t applied, uint64_t of)>;
 
-// Returns the scene in the state after its last record, in the epoch stored.epoch. The scene appends to `log`, which
-// outlives the scene. `find_mesh` is called for each mesh that the snapshot or a later record uses, and may return null
-// for a mesh that no instance uses after the last record. O(snapshot + records).
+// What a restored scene does with the log it was read from.
+enum class LogUse : uint8_t {
+  kAppend,    // it appends its changes
+  kReadOnly,  // it is a scene without a log, whose changes are not stored
+};
+
+// Returns the scene in the state after its last record, in the epoch stored.epoch. The scene uses `log`, which outlives
+// the scene, as `use` says. `find_mesh` is called for each mesh that the snapshot or a later record uses, and may
+// return null for a mesh that no instance uses after the last record. O(snapshot + records).
 absl::StatusOr<ScenePtr> recover_scene(UpdateLog& log, const StoredScene& stored, const FindMesh& find_mesh,
-                                       const RecoveryProgress& progress = nullptr);
+                                       const RecoveryProgress& progress = nullptr, LogUse use = LogUse::kAppend);
 
 struct RecoveredMesh {
   MeshPtr mesh;

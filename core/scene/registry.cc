@@ -199,8 +199,10 @@ absl::StatusOr<bool> Registry::delete_scene_if(const ScenePtr& scene, absl::Func
 
 void Registry::unregister(const Scene& scene) {
   const MutexLock lock(mutex_);
+  const auto known = scenes_.find(scene.name());
+  if (known == scenes_.end() || known->second.get() != &scene) return;  // dropped meanwhile
   take_from_creator(scene);
-  scenes_.erase(scene.name());
+  scenes_.erase(known);
 }
 
 std::vector<ScenePtr> Registry::list_scenes(const std::string& after, size_t limit) const {
@@ -430,6 +432,29 @@ void Registry::restore_damaged_mesh(const std::string& name, const absl::Status&
   LOCUS_CHECK(log_ != nullptr && !damage.ok());
   const MutexLock lock(mutex_);
   damaged_meshes_.emplace(name, damage);
+}
+
+void Registry::drop_scene(const std::string& name) {
+  ScenePtr dropped;  // freed after the lock is released, because freeing takes long
+  const MutexLock lock(mutex_);
+  damaged_scenes_.erase(name);
+  const auto known = scenes_.find(name);
+  if (known == scenes_.end()) return;
+  dropped = known->second;
+  take_from_creator(*dropped);
+  scenes_.erase(known);
+}
+
+void Registry::drop_mesh(const std::string& name) {
+  MeshPtr dropped;
+  const MutexLock lock(mutex_);
+  damaged_meshes_.erase(name);
+  mesh_graces_.erase(name);
+  const auto known = meshes_.find(name);
+  if (known == meshes_.end()) return;
+  dropped = known->second;
+  take_from_creator(*dropped);
+  meshes_.erase(known);
 }
 
 std::vector<Registry::NamedMesh> Registry::list_meshes(const std::string& after, size_t limit) const {

@@ -119,6 +119,7 @@ Scene::Scene(std::string name, SceneSpec spec, SceneWriter writer, const SceneLo
 }
 
 absl::Status Scene::closed_status() const {
+  if (!close_reason_.ok()) return close_reason_;
   Refusal refusal;
   refusal.reason = Reason::kNotFound;
   refusal.field = "scene";
@@ -510,8 +511,9 @@ uint64_t Scene::trim_history(uint64_t bytes) {
   return before - (trimmed->history == nullptr ? 0 : trimmed->history->bytes);
 }
 
-void Scene::close() {
+void Scene::close(const absl::Status& why) {
   const MutexLock lock(mutex_);
+  if (!closed_) close_reason_ = why;
   if (object_count_ != nullptr && !closed_) object_count_->fetch_sub(latest_->objects.size());
   closed_ = true;
   pins_->close();

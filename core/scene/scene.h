@@ -47,8 +47,9 @@ enum class OverloadPolicy : uint8_t {
 
 // Durability of an update at the time of its acknowledgement, for a scene with a log.
 enum class Durability : uint8_t {
-  kLocal,   // synced to this machine's disk
-  kMemory,  // synced soon after the ack: a crash of the machine may lose the latest updates
+  kLocal,       // synced to this machine's disk
+  kMemory,      // synced soon after the ack: a crash of the machine may lose the latest updates
+  kReplicated,  // synced by the replicated log of a cluster
 };
 
 constexpr AckLevel ack_level(Durability durability) {
@@ -280,9 +281,9 @@ class Scene {
   // contains an instance. Waits for a batch that is being applied.
   void forget_mesh(const StaticMesh* mesh) LOCUS_EXCLUDES(writer_mutex_, mutex_);
 
-  // Closes the scene after its deletion: wakes all waiters. Later calls of view() and of the members that change the
-  // scene return NOT_FOUND.
-  void close() LOCUS_EXCLUDES(mutex_);
+  // Closes the scene: wakes all waiters. Later calls of view() and of the members that change the scene return `why`
+  // or, if that is OK because the scene was deleted, NOT_FOUND. The first close() counts.
+  void close(const absl::Status& why = absl::OkStatus()) LOCUS_EXCLUDES(mutex_);
   // Deletes the scene from its log and closes it. If the log fails, returns the log's error, and the scene stays open.
   absl::Status remove() LOCUS_EXCLUDES(writer_mutex_, mutex_);
   // Does the same as remove() if `condition` returns true, and nothing otherwise. `condition` is called while no change
@@ -317,7 +318,7 @@ class Scene {
   void publish(const SnapshotPtr& snapshot) LOCUS_EXCLUDES(mutex_);
   // Notifies and removes the Watches that wait for `revision` or for an earlier revision.
   void notify_watches(uint64_t revision) LOCUS_REQUIRES(mutex_);
-  absl::Status closed_status() const;
+  absl::Status closed_status() const LOCUS_REQUIRES(mutex_);
   absl::Status check_open() const LOCUS_EXCLUDES(mutex_);
   absl::Status admit_change(const StaticChange& change) LOCUS_EXCLUDES(mutex_);
   void leave_change(const StaticChange& change, const absl::Status& result) LOCUS_EXCLUDES(mutex_);
@@ -373,6 +374,7 @@ class Scene {
   uint64_t lease_changes_ LOCUS_GUARDED_BY(writer_mutex_) = 0;  // SceneWriter::lease_changes() of leases_
   Id next_chosen_id_ LOCUS_GUARDED_BY(mutex_);
   bool closed_ LOCUS_GUARDED_BY(mutex_) = false;
+  absl::Status close_reason_ LOCUS_GUARDED_BY(mutex_);
   const std::shared_ptr<ReaderTracker> pins_;  // shared, because pins may outlive the scene
 };
 

@@ -82,7 +82,7 @@ absl::StatusOr<SceneSpec> decode_spec(absl::string_view bytes) {
   spec.history.bytes = reader.number_upto(limits::kMaxHistoryBytes, "the bytes of the history");
   spec.pinned_bytes = reader.number("pinned_bytes");
   spec.overload = read_enum(reader, OverloadPolicy::kLatestWins, "the overload policy");
-  spec.durability = read_enum(reader, Durability::kMemory, "the durability");
+  spec.durability = read_enum(reader, Durability::kReplicated, "the durability");
   read_labels(reader, spec);
   if (kind != BytesKind::kSceneSpec) spec.creator = std::string(reader.text(limits::kMaxCreatorLength, "the creator"));
   if (has_lifetimes(kind)) read_lifetimes(reader, spec);

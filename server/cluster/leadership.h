@@ -57,9 +57,10 @@ class Leadership {
   // Records that an append with `token` was refused because of the fence, or that the scene was deleted: its lease
   // stops at once. Returns false if the scene was not led with this token any more.
   bool fenced(SceneKey scene, Token token);
-  // Hands a scene over to a follower that has all of its records. `done` receives NOT_FOUND if this daemon does not
-  // lead the scene, FAILED_PRECONDITION if `to` is not such a follower, ABORTED if the leader changed meanwhile, and
-  // UNAVAILABLE if the engine did not answer recently; after the first, second and last this daemon leads as before.
+  // Hands a scene over to a follower that has all of its records or, if the scene has none, to any living member.
+  // `done` receives NOT_FOUND if this daemon does not lead the scene, FAILED_PRECONDITION if `to` is not such a member,
+  // ABORTED if the leader changed meanwhile, and UNAVAILABLE if the engine did not answer recently; after the first,
+  // second and last this daemon leads as before.
   void move(SceneKey scene, MemberId to, MoveDone done) LOCUS_EXCLUDES(mutex_);
   // Begins to hand over all scenes, each to a follower that has all of its records or else to the less loaded of two
   // members, then to leave the cluster.

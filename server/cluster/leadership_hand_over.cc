@@ -82,7 +82,7 @@ bool Leadership::begin_hand_over() {
     return true;
   }
   const std::vector<MemberId> followers = host_.caught_up_followers(move->scene);
-  if (!drains && std::find(followers.begin(), followers.end(), move->to) == followers.end()) {
+  if (!drains && !followers.empty() && std::find(followers.begin(), followers.end(), move->to) == followers.end()) {
     finish_move(*move, absl::FailedPreconditionError("the member is no follower that has all records of the scene"));
     return true;
   }

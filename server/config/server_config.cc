@@ -127,6 +127,22 @@ void add_security_options(CLI::App& app, ServerConfig& config) {
       ->capture_default_str();
 }
 
+void add_cluster_options(CLI::App& app, ServerConfig& config) {
+  app.add_option("--cluster", config.cluster,
+                 "Replicated PostgreSQL of the cluster to join: postgresql://host,host,host/database; empty = none")
+      ->capture_default_str();
+  app.add_option("--advertise", config.advertise,
+                 "Address at which clients and members of the cluster reach this daemon [the first of --listen]")
+      ->capture_default_str();
+  app.add_option("--zone", config.zone, "Part of the site that fails as one, such as a rack")->capture_default_str();
+  const std::map<std::string, ReplicatedBy> copies = {{"standbys", ReplicatedBy::kStandbys},
+                                                      {"storage", ReplicatedBy::kStorage}};
+  app.add_option("--engine-replication", config.engine_replication,
+                 "Who copies changes to a second machine: standbys of PostgreSQL, or its storage")
+      ->transform(CLI::CheckedTransformer(copies).description(""))
+      ->default_str(name_of(copies, config.engine_replication));
+}
+
 // Adds all options to the parser, which keeps pointers into `config` and writes the parsed values there.
 void add_options(CLI::App& app, ServerConfig& config) {
   app.add_option("--listen", config.listen, "Address to listen on: host:port, [v6]:port or unix:/path; repeatable")
@@ -204,6 +220,7 @@ void add_options(CLI::App& app, ServerConfig& config) {
   app.add_option("--end-with-parent", config.end_with_parent,
                  "Process id of the process that starts the daemon, which then ends together with it; 0 = none")
       ->capture_default_str();
+  add_cluster_options(app, config);
   add_connection_options(app, config);
   add_security_options(app, config);
   app.add_flag("--insecure", config.insecure, "Listen beyond this machine without encryption or access control");
@@ -375,6 +392,34 @@ Invocation help(const std::vector<std::string>& arguments) {
   return invocation;
 }
 
+// Checks the options of a cluster. `tcp`: the daemon listens on a TCP address.
+absl::Status check_cluster(const ServerConfig& config, bool tcp) {
+  if (config.cluster.empty()) {
+    if (!config.advertise.empty() || !config.zone.empty())
+      return absl::InvalidArgumentError("--advertise and --zone are for members of a cluster; give --cluster too");
+    return absl::OkStatus();
+  }
+  if (!config.data_dir.empty())
+    return absl::InvalidArgumentError(
+        "--data-dir and --cluster exclude each other: the engine of the cluster stores the scenes; leave one out");
+  if (!tcp) return absl::InvalidArgumentError("--cluster needs a TCP address among --listen, for the other members");
+  if (config.advertise.empty()) {
+    const auto unspecified = [](const std::string& text) {
+      const absl::StatusOr<ListenAddress> address = parse_listen_address(text);
+      return address.ok() && (address->host == "0.0.0.0" || address->host == "::");
+    };
+    if (std::any_of(config.listen.begin(), config.listen.end(), unspecified))
+      return absl::InvalidArgumentError(
+          "--cluster needs --advertise HOST:PORT if the daemon listens on all addresses of the machine");
+    return absl::OkStatus();
+  }
+  const absl::StatusOr<ListenAddress> advertised = parse_listen_address(config.advertise);
+  if (!advertised.ok() || advertised->kind != ListenAddress::Kind::kTcp || advertised->port == 0)
+    return absl::InvalidArgumentError(
+        absl::StrCat("--advertise is '", config.advertise, "'; give host:port, such as locus-0.locus:7575"));
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 void follow_machine(ServerConfig& config) {
@@ -451,7 +496,9 @@ std::string environment_variable(const std::string& option) {
   return absl::StrCat("LOCUS_", absl::AsciiStrToUpper(absl::StrReplaceAll(option, {{"-", "_"}})));
 }
 
-bool may_be_empty(const std::string& option) { return option == "http-listen" || option == "data-dir"; }
+bool may_be_empty(const std::string& option) {
+  return option == "http-listen" || option == "data-dir" || option == "cluster";
+}
 
 std::optional<std::string> process_environment(const std::string& name) {
   const char* value = std::getenv(name.c_str());
@@ -490,6 +537,7 @@ absl::Status check_config(const ServerConfig& config) {
       RETURN_IF_ERROR(check_protected(config, kListen, text, "read and change every scene"));
     tcp = tcp || address.kind == ListenAddress::Kind::kTcp;
   }
+  RETURN_IF_ERROR(check_cluster(config, tcp));
   if (!config.port_file.empty() && !tcp)
     return absl::InvalidArgumentError("--port-file needs a TCP address among --listen; a unix socket has no port");
   return check_http(config);

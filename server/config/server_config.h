@@ -20,6 +20,9 @@ enum class LogLevel : uint8_t { kDebug, kInfo, kWarning, kError };
 enum class LogFormat : uint8_t { kText, kJson };
 enum class BatchPriority : uint8_t { kNice, kIdle };
 
+// Who copies each change to a second machine before the engine of a cluster acknowledges it.
+enum class ReplicatedBy : uint8_t { kStandbys, kStorage };
+
 inline constexpr const char* kDefaultHttpListen = "127.0.0.1:7576";
 
 struct ServerConfig {
@@ -51,6 +54,23 @@ struct ServerConfig {
   // directory is created if it is missing, and only one daemon at a time can use it. If there are many updates, put the
   // directory on a disk of its own, because updates wait for that disk before they are acknowledged.
   std::string data_dir;
+
+  // Engine of the cluster that the daemon joins: postgresql://[user@]host[:port],.../database, the hosts of a
+  // replicated PostgreSQL, with settings of libpq such as ?passfile=/etc/locus/pgpass&sslmode=verify-full; empty = no
+  // cluster. Scenes and meshes are then stored by the engine, so there is no `data_dir`. Passwords belong into the
+  // password file.
+  std::string cluster;
+
+  // Address at which clients and the other members reach this daemon, `host:port`; empty = the first TCP address of
+  // `listen`, which suffices if the others reach that. Set it if the daemon listens on all addresses of the machine.
+  std::string advertise;
+
+  // Part of the site that fails as one, such as a rack; empty = none. Shown with the members of the cluster.
+  std::string zone;
+
+  // `standbys`: the engine has synchronous standbys, without which it is refused. `storage`: the engine has none,
+  // because its storage copies each change, as that of some managed databases does.
+  ReplicatedBy engine_replication = ReplicatedBy::kStandbys;
 
   // When a scene's updates in the log have this size in bytes, they are replaced by a snapshot of the scene. For a
   // scene that is larger than this value, the size of the scene is used instead. Lower the value for a faster start and

@@ -54,6 +54,8 @@ absl::StatusOr<double> to_cell_size(double size, absl::string_view field);
 // cannot be changed, for a value that `fields` does not name, and for a field that this server does not know.
 absl::StatusOr<SettingsChange> to_settings(const v1::UpdateSceneRequest& request);
 absl::Status check_labels(const google::protobuf::Map<std::string, std::string>& labels, const std::string& field);
+// Returns the settings of a scene; `settings` has those that can be changed.
+v1::SceneSpec spec_to_proto(const SceneSpec& spec, const SceneSettings& settings);
 // Returns the description of a scene. `summary` is the summary of this scene.
 v1::Scene to_proto(const Scene& scene, const SceneSummary& summary);
 v1::Source to_proto(Source source);

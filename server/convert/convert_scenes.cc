@@ -17,18 +17,16 @@ namespace {
 // Upper bound of the size in bytes of the protobuf tag and length of a mesh part.
 constexpr size_t kPartFrameBytes = 4;
 
-v1::SceneSpec spec_to_proto(const SceneSpec& spec, const SceneSettings& settings) {
-  v1::SceneSpec out;
-  for (const auto& [key, value] : settings.labels) (*out.mutable_labels())[key] = value;
-  out.set_cell_size(settings.cell_size);
-  out.set_history_ticks(spec.history.ticks);
-  out.set_history_bytes(spec.history.bytes);
-  out.set_idle_ttl_s(spec.idle_ttl_s);
-  out.set_mesh_grace_s(spec.mesh_grace_s);
-  out.set_winding(spec.winding == Winding::kClockwise ? v1::WINDING_CLOCKWISE : v1::WINDING_COUNTER_CLOCKWISE);
-  out.set_overload(spec.overload == OverloadPolicy::kLatestWins ? v1::OVERLOAD_POLICY_LATEST_WINS
-                                                                : v1::OVERLOAD_POLICY_EVERY_BATCH);
-  return out;
+v1::Durability to_proto(Durability durability) {
+  switch (durability) {
+    case Durability::kLocal:
+      return v1::DURABILITY_LOCAL;
+    case Durability::kMemory:
+      return v1::DURABILITY_MEMORY;
+    case Durability::kReplicated:
+      return v1::DURABILITY_REPLICATED;
+  }
+  return v1::DURABILITY_UNSPECIFIED;
 }
 
 v1::HistoryLimit to_proto(PastLimit limit) {
@@ -196,6 +194,22 @@ absl::StatusOr<SceneSpec> to_spec(const v1::SceneSpec& spec) {
   out.winding = spec.winding() == v1::WINDING_CLOCKWISE ? Winding::kClockwise : Winding::kCounterClockwise;
   if (spec.overload() == v1::OVERLOAD_POLICY_LATEST_WINS) out.overload = OverloadPolicy::kLatestWins;
   if (spec.durability() == v1::DURABILITY_MEMORY) out.durability = Durability::kMemory;
+  if (spec.durability() == v1::DURABILITY_REPLICATED) out.durability = Durability::kReplicated;
+  return out;
+}
+
+v1::SceneSpec spec_to_proto(const SceneSpec& spec, const SceneSettings& settings) {
+  v1::SceneSpec out;
+  for (const auto& [key, value] : settings.labels) (*out.mutable_labels())[key] = value;
+  out.set_cell_size(settings.cell_size);
+  out.set_history_ticks(spec.history.ticks);
+  out.set_history_bytes(spec.history.bytes);
+  out.set_idle_ttl_s(spec.idle_ttl_s);
+  out.set_mesh_grace_s(spec.mesh_grace_s);
+  out.set_durability(to_proto(spec.durability));
+  out.set_winding(spec.winding == Winding::kClockwise ? v1::WINDING_CLOCKWISE : v1::WINDING_COUNTER_CLOCKWISE);
+  out.set_overload(spec.overload == OverloadPolicy::kLatestWins ? v1::OVERLOAD_POLICY_LATEST_WINS
+                                                                : v1::OVERLOAD_POLICY_EVERY_BATCH);
   return out;
 }
 
@@ -204,8 +218,7 @@ v1::Scene to_proto(const Scene& scene, const SceneSummary& summary) {
   v1::Scene out;
   out.set_name(scene.name());
   *out.mutable_spec() = spec_to_proto(scene.spec(), scene.settings());
-  const bool local = scene.log_key() != 0 && scene.spec().durability == Durability::kLocal;
-  out.mutable_spec()->set_durability(local ? v1::DURABILITY_LOCAL : v1::DURABILITY_MEMORY);
+  if (scene.log_key() == 0) out.mutable_spec()->set_durability(v1::DURABILITY_MEMORY);
   out.set_state(status.pending_changes > 0 ? v1::SCENE_STATE_BUILDING : v1::SCENE_STATE_READY);
   out.set_epoch(summary.epoch);
   out.set_revision(summary.revision);

@@ -34,6 +34,9 @@
 
 namespace locus::server {
 
+class ClusterMeshes;
+class ClusterScenes;
+
 struct Host : RpcState {
   // `with_log` is the durable log, borrowed; if it is null, scenes are stored in memory only.
   Host(const ServerConfig& with, UpdateLog* with_log)
@@ -95,6 +98,10 @@ struct Host : RpcState {
   std::string http_host;
   uint16_t http_port = 0;
   UpdateLog* const log;
+  // The daemon's part in a cluster (server/services/cluster); both null without a cluster. Set before the first call is
+  // served.
+  ClusterScenes* cluster = nullptr;
+  ClusterMeshes* cluster_meshes = nullptr;
   SlowQueries slow_queries;
   Registry registry;
   Mutex create_mutex;  // held while the scenes are counted and a scene is added

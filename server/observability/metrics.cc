@@ -22,9 +22,9 @@ RefusalName name_of(const absl::Status& status) {
 
 absl::string_view rpc_name(Rpc rpc) {
   static constexpr std::array<absl::string_view, kRpcs> kNames = {
-      "GetServer",    "GetQuotas",     "Backup",     "CreateScene",   "GetScene",     "ListScenes",      "DeleteScene",
-      "UpdateScene",  "UploadMesh",    "ListMeshes", "DeleteMesh",    "DownloadMesh", "ChangeInstances", "DumpScene",
-      "ApplyUpdates", "StreamUpdates", "Query",      "StreamQueries", "Step"};
+      "GetServer",   "GetQuotas",    "Backup",        "MoveScene",  "CreateScene",   "GetScene",     "ListScenes",
+      "DeleteScene", "UpdateScene",  "UploadMesh",    "ListMeshes", "DeleteMesh",    "DownloadMesh", "ChangeInstances",
+      "DumpScene",   "ApplyUpdates", "StreamUpdates", "Query",      "StreamQueries", "Step"};
   LOCUS_DCHECK_LT(static_cast<size_t>(rpc), kRpcs);
   return kNames[static_cast<size_t>(rpc)];
 }

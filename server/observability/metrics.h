@@ -34,6 +34,7 @@ enum class Rpc : uint8_t {
   kGetServer,
   kGetQuotas,
   kBackup,
+  kMoveScene,
   kCreateScene,
   kGetScene,
   kListScenes,
@@ -51,7 +52,7 @@ enum class Rpc : uint8_t {
   kStreamQueries,
   kStep,
 };
-inline constexpr size_t kRpcs = 19;
+inline constexpr size_t kRpcs = 20;
 // Returns the rpc's name in the protocol, such as "StreamQueries".
 absl::string_view rpc_name(Rpc rpc);
 

@@ -70,6 +70,7 @@ inline constexpr std::array kRpcRights = std::to_array<RpcRight>({
     {"/locus.v1.ServerService/GetServer", Need::kAnyGrant, Right::kRead},
     {"/locus.v1.ServerService/GetQuotas", Need::kAnyGrant, Right::kRead},
     {"/locus.v1.ServerService/Backup", Need::kServerRight, Right::kBackup},
+    {"/locus.v1.ServerService/MoveScene", Need::kSceneRight, Right::kAdmin, SceneField::kScene},
     {"/grpc.health.v1.Health/Check", Need::kNothing, Right::kRead},
     {"/grpc.health.v1.Health/Watch", Need::kNothing, Right::kRead},
     {"/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo", Need::kServerRight, Right::kReflection},

@@ -7,6 +7,7 @@
 #include "core/base/status_macros.h"
 #include "server/convert/convert.h"
 #include "server/observability/log.h"
+#include "server/services/cluster/cluster_meshes.h"
 #include "server/services/scene_access.h"
 #include "server/services/scene_calls.h"
 
@@ -108,6 +109,8 @@ void log_failure(const Scene& scene, uint64_t number, const absl::StatusOr<Insta
       {{"scene", scene.name()}, {"change", absl::StrCat(number)}, {"text", std::string(change.status().message())}});
 }
 
+bool removes(const StaticChange& change) { return !change.remove_ids.empty() || !change.remove_groups.empty(); }
+
 // Queues the change together with the claim of its memory. Returns the change's number.
 absl::StatusOr<uint64_t> submit(Host& host, const SharedUse& scene, uint64_t epoch, std::shared_ptr<OwnedChange> owned,
                                 SharedClaim room, std::shared_ptr<Outcome> outcome) {
@@ -124,9 +127,22 @@ absl::StatusOr<uint64_t> submit(Host& host, const SharedUse& scene, uint64_t epo
           host.metrics.record_instance_change(nanoseconds_since(arrived));
           host.mesh_collector.instances_changed(**scene);
         }
+        if (host.cluster_meshes != nullptr && (!change.ok() || removes(owned->change)))
+          host.cluster_meshes->release_unused(**scene);
         log_failure(**scene, number, change);
         outcome->set(std::move(change));
       });
+}
+
+// Reads the meshes that a change places from the engine of a cluster. Missing ones are left to to_change(), whose error
+// names the field.
+absl::Status read_meshes(Host& host, const v1::ChangeInstancesRequest& request) {
+  if (host.cluster_meshes == nullptr) return absl::OkStatus();
+  for (const v1::Placement& placement : request.place()) {
+    const absl::Status read = host.cluster_meshes->refresh(placement.mesh(), "mesh").status();
+    if (!absl::IsNotFound(read)) RETURN_IF_ERROR(read);
+  }
+  return absl::OkStatus();
 }
 
 }  // namespace
@@ -134,16 +150,18 @@ absl::StatusOr<uint64_t> submit(Host& host, const SharedUse& scene, uint64_t epo
 absl::Status change_instances(Host& host, const Caller& caller, const v1::ChangeInstancesRequest& request,
                               MessageStream& stream) {
   caller.set_subject(request.scene());
-  ASSIGN_OR_RETURN(UsedScene found, use_scene(host, caller, request.scene(), "scene"));
+  ASSIGN_OR_RETURN(UsedScene found, use_scene(host, caller, request.scene(), "scene", LookUp::kMayWait));
   const auto scene = std::make_shared<const UsedScene>(std::move(found));
   ASSIGN_OR_RETURN(SharedClaim room, make_room(caller, **scene, request));
   // Held until the response is written.
   ASSIGN_OR_RETURN(const CallMemory reply, claim_copy(caller, placed_count(request) * kReplyBytesAPlacement));
   for (const v1::Placement& placement : request.place()) host.mesh_collector.renew(placement.mesh());
+  RETURN_IF_ERROR(read_meshes(host, request));
   ASSIGN_OR_RETURN(const std::shared_ptr<OwnedChange> owned, read_change(*scene, host.registry, request));
   // Check the placements without the scene's instances, because changes that were queued earlier may still alter those
   // instances.
   if (request.no_wait()) RETURN_IF_ERROR(StaticSet::check_placements(owned->change.place));
+  if (host.cluster_meshes != nullptr) RETURN_IF_ERROR(host.cluster_meshes->claim(**scene, owned->change));
   const auto outcome = std::make_shared<Outcome>();
   const uint64_t epoch = (*scene)->latest()->epoch;
   ASSIGN_OR_RETURN(const uint64_t number, submit(host, scene, epoch, owned, std::move(room), outcome));

@@ -112,7 +112,7 @@ uint64_t download_cost(const StaticMesh& mesh) {
 absl::Status download_mesh(Host& host, const Caller& caller, const v1::DownloadMeshRequest& request,
                            MessageStream& stream) {
   RETURN_IF_ERROR(check_mesh_name(request.mesh(), "mesh"));
-  ASSIGN_OR_RETURN(MeshPtr mesh, host.registry.find_mesh(request.mesh(), "mesh"));
+  ASSIGN_OR_RETURN(MeshPtr mesh, find_mesh(host, request.mesh()));
   ASSIGN_OR_RETURN(const CallMemory claim, claim_copy(caller, download_cost(*mesh)));
   const uint32_t uses = host.registry.mesh_uses(mesh.get());
   const auto take = [&](const v1::DownloadMeshResponse& piece) { return caller.stop().ok() && stream.write(piece); };

@@ -12,6 +12,7 @@
 #include "server/convert/status.h"
 #include "server/observability/log.h"
 #include "server/scheduling/clocks.h"
+#include "server/services/cluster/cluster_scenes.h"
 
 namespace locus::server {
 
@@ -126,12 +127,22 @@ void QueryWork::look() {
   absl::StatusOr<SnapshotPin> pin = scene_->pin(view_, SteadyTime::min());
   if (pin.ok()) {
     pin_.emplace(*std::move(pin));
+    if (absl::Status status = check_age(); !status.ok()) return answer(std::move(status));
     return run();
   }
   const bool may_come = pin.status().code() == absl::StatusCode::kDeadlineExceeded && steady_clock::now() < until_;
   if (!may_come) return answer(pin.status());
   if (host_.drain.draining()) return answer(no_longer());
   wait();
+}
+
+// Checks the lease of the scene's leader after the revision was pinned: an update that another leader acknowledges
+// later is later than this answer.
+absl::Status QueryWork::check_age() {
+  age_ms_ = host_.cluster == nullptr ? 0 : host_.cluster->age_ms(*scene_);
+  const v1::View& wanted = message_->view();
+  const bool too_old = wanted.max_age_ms() != 0 && age_ms_ > wanted.max_age_ms();
+  return age_ms_ != 0 && (too_old || wanted.leader_only()) ? host_.cluster->check_leads(*scene_) : absl::OkStatus();
 }
 
 // Returns the error for a query batch that stops waiting for its revision, because the call has ended or because the
@@ -237,6 +248,7 @@ void QueryWork::finished(bool) {
   result_->set_epoch((*pin_)->epoch);
   result_->set_revision((*pin_)->revision);
   result_->set_tick((*pin_)->tick);
+  result_->set_age_ms(age_ms_);
   for (size_t i = 0; i < batch_.blocks.size(); ++i) learn(batch_.blocks[i], run_->cost(i));
   if (message_->explain()) explain();
   note_if_slow();

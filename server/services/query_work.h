@@ -115,6 +115,8 @@ class QueryWork final : private QueryJob, private DeferredTask {
   void resume();
   // Returns the status with which a parked batch is answered when the wait for its revision is given up.
   absl::Status no_longer() const;
+  // Sets age_ms_, and returns NO_LEADER if the view demands a younger answer.
+  absl::Status check_age();
 
   void run();
   // Claims memory for the instances that the queries interpolate between ticks.
@@ -142,6 +144,7 @@ class QueryWork final : private QueryJob, private DeferredTask {
   QueryBatch batch_;
   bool is_step_ = false;    // the answer contains the ack of an applied update
   uint64_t ack_bytes_ = 0;  // size of that ack
+  uint32_t age_ms_ = 0;     // QueryResult.age_ms
   SteadyTime until_;
   SteadyTime started_;  // time at which run() began, which is after the wait for a revision
 

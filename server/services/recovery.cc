@@ -28,16 +28,6 @@ std::string milliseconds_since(steady_clock::time_point start) {
   return absl::StrCat(std::chrono::duration_cast<std::chrono::milliseconds>(steady_clock::now() - start).count());
 }
 
-// Returns the error for calls that use a damaged scene or mesh, until it is repaired or deleted.
-absl::Status damaged(const char* field, const absl::Status& damage) {
-  Refusal refusal;
-  refusal.reason = Reason::kDamaged;
-  refusal.field = field;
-  const char* const advice =
-      absl::StrContains(damage.message(), "locusd") ? "" : "; see `locusd check`, then `locusd repair` or a backup";
-  return refuse(absl::StatusCode::kDataLoss, absl::StrCat(damage.message(), advice), refusal);
-}
-
 // One run of recover_all(). The private members run on several threads of the pool.
 class Recovery {
  public:
@@ -88,7 +78,7 @@ class Recovery {
       if (named.ok()) {
         host_.registry.restore_mesh(name->name, *named, name->grace_s);
       } else if (take_damage("mesh", name->name, named.status())) {
-        host_.registry.restore_damaged_mesh(name->name, damaged("mesh", named.status()));
+        host_.registry.restore_damaged_mesh(name->name, damaged_data("mesh", named.status()));
       }
       count();
     }
@@ -106,7 +96,7 @@ class Recovery {
            {"records", absl::StrCat(stored.last_sequence - stored.snapshot_sequence)},
            {"milliseconds", milliseconds_since(start)}});
     } else if (take_damage("scene", stored.name, scene.status())) {
-      host_.registry.restore_damaged_scene(stored.name, stored.key, damaged("scene", scene.status()));
+      host_.registry.restore_damaged_scene(stored.name, stored.key, damaged_data("scene", scene.status()));
     }
     count();
   }
@@ -183,6 +173,15 @@ void log_snapshot(const Scene& scene, const absl::StatusOr<uint64_t>& bytes) {
 }
 
 }  // namespace
+
+absl::Status damaged_data(const char* field, const absl::Status& damage) {
+  Refusal refusal;
+  refusal.reason = Reason::kDamaged;
+  refusal.field = field;
+  const char* const advice =
+      absl::StrContains(damage.message(), "locusd") ? "" : "; see `locusd check`, then `locusd repair` or a backup";
+  return refuse(absl::StatusCode::kDataLoss, absl::StrCat(damage.message(), advice), refusal);
+}
 
 uint64_t new_epoch() {
   std::random_device device;

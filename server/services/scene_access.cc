@@ -7,6 +7,8 @@
 #include "core/base/names.h"
 #include "core/base/status_macros.h"
 #include "server/convert/status.h"
+#include "server/services/cluster/cluster_meshes.h"
+#include "server/services/cluster/cluster_scenes.h"
 
 namespace locus::server {
 namespace {
@@ -22,20 +24,27 @@ constexpr milliseconds kReadersMayTake{1000};
 }  // namespace
 
 absl::StatusOr<ScenePtr> find_scene(const Host& host, const Caller& caller, const std::string& name,
-                                    absl::string_view field) {
+                                    absl::string_view field, LookUp look_up) {
   RETURN_IF_ERROR(check_scene_name(name, field));
   RETURN_IF_ERROR(caller.check_scene(name));
   if (absl::Status status = caller.check_right(name); !status.ok()) {
     if (absl::IsNotFound(status)) caller.audit_hidden(name);
     return status;
   }
-  return host.registry.find_scene(name);
+  absl::StatusOr<ScenePtr> scene = host.registry.find_scene(name);
+  if (host.cluster == nullptr || !absl::IsNotFound(scene.status())) return scene;
+  return look_up == LookUp::kMayWait ? host.cluster->wait_for(name) : host.cluster->missing(name);
 }
 
 absl::StatusOr<UsedScene> use_scene(const Host& host, const Caller& caller, const std::string& name,
-                                    absl::string_view field) {
-  ASSIGN_OR_RETURN(ScenePtr scene, find_scene(host, caller, name, field));
+                                    absl::string_view field, LookUp look_up) {
+  ASSIGN_OR_RETURN(ScenePtr scene, find_scene(host, caller, name, field, look_up));
   return UsedScene(std::move(scene));
+}
+
+absl::StatusOr<MeshPtr> find_mesh(const Host& host, const std::string& name) {
+  if (host.cluster_meshes == nullptr) return host.registry.find_mesh(name, "mesh");
+  return host.cluster_meshes->refresh(name, "mesh");
 }
 
 absl::StatusOr<CallMemory> claim_copy(const Caller& caller, uint64_t bytes, MemoryLine line) {

@@ -16,10 +16,14 @@
 
 namespace locus::server {
 
+// Whether a lookup may wait for the engine of a cluster, for about a second, to find out who has a scene.
+enum class LookUp : uint8_t { kNeverWaits, kMayWait };
+
 // Checks the scene's name, the metadata x-scene and the caller's right to the scene, then returns the scene. `field` is
-// the field of the request that contains the name; the error for a malformed name repeats `field`.
+// the field of the request that contains the name; the error for a malformed name repeats `field`. In a cluster, a
+// scene that this daemon does not have is FAILED_PRECONDITION (ELSEWHERE) or UNAVAILABLE (NO_LEADER).
 absl::StatusOr<ScenePtr> find_scene(const Host& host, const Caller& caller, const std::string& name,
-                                    absl::string_view field);
+                                    absl::string_view field, LookUp look_up = LookUp::kNeverWaits);
 
 // Scene that a call uses. The use of a scene with idle_ttl_s is counted until reset() or the destructor, so that the
 // scene is not deleted as idle meanwhile. One thread at a time.
@@ -62,7 +66,11 @@ inline uint64_t tested_by_list(const SceneSnapshot& snapshot) {
 
 // Returns the scene that find_scene() returns, for a call that uses it.
 absl::StatusOr<UsedScene> use_scene(const Host& host, const Caller& caller, const std::string& name,
-                                    absl::string_view field);
+                                    absl::string_view field, LookUp look_up = LookUp::kNeverWaits);
+
+// Returns the mesh of this name, or NOT_FOUND naming the field `mesh`. In a cluster, reads it from the engine if this
+// daemon has not read it or has read another one of the name; may wait.
+absl::StatusOr<MeshPtr> find_mesh(const Host& host, const std::string& name);
 
 // Claims `bytes` for responses that copy parts of scenes or meshes. A claim of up to 64 KiB uses MemoryLine::kReplies,
 // whose claims are refused last; a larger claim uses `line`.

@@ -7,6 +7,7 @@
 #include "core/base/status_macros.h"
 #include "core/scene/snapshot/scene_snapshot.h"
 #include "server/convert/convert.h"
+#include "server/services/cluster/cluster_scenes.h"
 #include "server/services/scene_access.h"
 #include "server/services/scene_calls.h"
 
@@ -219,9 +220,10 @@ uint64_t dump_cost(const SceneSnapshot& snapshot) {
 }  // namespace
 
 absl::Status dump_scene(Host& host, const Caller& caller, const v1::DumpSceneRequest& request, MessageStream& stream) {
-  ASSIGN_OR_RETURN(const UsedScene scene, use_scene(host, caller, request.scene(), "scene"));
+  ASSIGN_OR_RETURN(const UsedScene scene, use_scene(host, caller, request.scene(), "scene", LookUp::kMayWait));
   RETURN_IF_ERROR(check_work(caller));
   ASSIGN_OR_RETURN(SnapshotPin snapshot, wait_for(*scene, to_view(request.view()), caller.wait_until(false), caller));
+  if (request.view().leader_only() && host.cluster != nullptr) RETURN_IF_ERROR(host.cluster->check_leads(*scene));
   ASSIGN_OR_RETURN(const CallMemory claim, claim_copy(caller, dump_cost(*snapshot)));
   // A caller that reads slowly could keep the snapshot pinned without a time limit. Therefore the call is cancelled
   // when the pin is revoked.

@@ -14,6 +14,8 @@
 #include "server/convert/status.h"
 #include "server/observability/log.h"
 #include "server/rpc/call.h"
+#include "server/services/cluster/cluster_scenes.h"
+#include "server/services/cluster_calls.h"
 #include "server/services/creator_quotas.h"
 #include "server/services/recovery.h"
 #include "server/services/scene_access.h"
@@ -90,8 +92,9 @@ absl::Status list_scenes(const Caller& caller, Host& host, const v1::ListScenesR
   RETURN_IF_ERROR(check_labels(request.labels(), "labels"));
   std::string after = request.page_token();
   if (!after.empty()) RETURN_IF_ERROR(check_page_token(check_scene_name(after, "page_token")));
-  const size_t most = std::min(page_size, host.registry.scene_count());
+  const size_t most = host.cluster != nullptr ? page_size : std::min(page_size, host.registry.scene_count());
   ASSIGN_OR_RETURN(const CallMemory claim, claim_copy(caller, kPageCopies * most * kDescribedSceneBytes));
+  if (host.cluster != nullptr) return list_in_cluster(caller, host, request, after, page_size, response);
   std::vector<Listed> all = damaged_after(caller, host, after, request);
   while (true) {
     const std::vector<ScenePtr> scenes = host.registry.list_scenes(after, limits::kMaxPageSize);
@@ -114,7 +117,7 @@ absl::Status list_scenes(const Caller& caller, Host& host, const v1::ListScenesR
 absl::Status describe_mesh(const Caller& caller, Host& host, const v1::ListMeshesRequest& request,
                            v1::ListMeshesResponse& response) {
   RETURN_IF_ERROR(check_mesh_name(request.mesh(), "mesh"));
-  ASSIGN_OR_RETURN(const MeshPtr mesh, host.registry.find_mesh(request.mesh(), "mesh"));
+  ASSIGN_OR_RETURN(const MeshPtr mesh, find_mesh(host, request.mesh()));
   ASSIGN_OR_RETURN(const CallMemory claim, claim_copy(caller, kPageCopies * parts_cost(mesh->parts())));
   const Registry::NamedMesh named{mesh->name(), mesh, host.registry.mesh_uses(mesh.get())};
   *response.add_meshes() = to_proto(named, request.first_part(), request.without_parts() ? 0 : kMaxDescribedPartBytes);
@@ -128,6 +131,8 @@ absl::Status list_meshes(const Caller& caller, Host& host, const v1::ListMeshesR
   ASSIGN_OR_RETURN(const size_t page_size, read_page_size(request.page_size()));
   if (!request.page_token().empty())
     RETURN_IF_ERROR(check_page_token(check_mesh_name(request.page_token(), "page_token")));
+  if (host.cluster != nullptr)
+    return list_cluster_meshes(host, request.page_token(), page_size, max_part_bytes, response);
   const std::vector<Registry::NamedMesh> meshes = host.registry.list_meshes(request.page_token(), page_size + 1);
   uint64_t most = 0;
   for (const Registry::NamedMesh& mesh : meshes) most += parts_cost(mesh.mesh->parts());
@@ -145,10 +150,12 @@ absl::Status list_meshes(const Caller& caller, Host& host, const v1::ListMeshesR
 
 absl::Status delete_scene(const Caller& caller, Host& host, const v1::DeleteSceneRequest& request) {
   caller.set_subject(request.name());
-  const absl::StatusOr<ScenePtr> scene = find_scene(host, caller, request.name(), "name");
+  const absl::StatusOr<ScenePtr> scene = find_scene(host, caller, request.name(), "name", LookUp::kMayWait);
   absl::Status status = scene.status();
   // A damaged scene can still be deleted.
-  if (status.ok() || absl::IsDataLoss(status)) status = host.registry.delete_scene(request.name());
+  if (status.ok() || absl::IsDataLoss(status))
+    status =
+        host.cluster != nullptr ? host.cluster->remove(request.name()) : host.registry.delete_scene(request.name());
   if (status.code() == absl::StatusCode::kNotFound && request.if_present()) return absl::OkStatus();
   RETURN_IF_ERROR(status);
   if (scene.ok()) {
@@ -183,6 +190,14 @@ absl::StatusOr<Registry::CreatedScene> add_scene(Host& host, const v1::CreateSce
                                     request.if_absent());
 }
 
+// Returns UNIMPLEMENTED if this server does not store scenes as `spec` asks.
+absl::Status check_durability(const Host& host, const v1::SceneSpec& spec) {
+  const bool local = spec.durability() == v1::DURABILITY_LOCAL;
+  const bool replicated = spec.durability() == v1::DURABILITY_REPLICATED;
+  const bool served = host.cluster != nullptr ? !local : !replicated && (!local || host.log != nullptr);
+  return served ? absl::OkStatus() : not_served("spec.durability");
+}
+
 absl::Status create_scene(const Caller& caller, Host& host, const v1::CreateSceneRequest& request,
                           v1::CreateSceneResponse& response) {
   RETURN_IF_ERROR(check_scene_name(request.name(), "name"));
@@ -190,7 +205,9 @@ absl::Status create_scene(const Caller& caller, Host& host, const v1::CreateScen
   caller.set_subject(request.name());
   if (!caller.may(Right::kAdmin, request.name())) return caller.lacks_right(Right::kAdmin, request.name());
   ASSIGN_OR_RETURN(SceneSpec spec, to_spec(request.spec()));
-  if (request.spec().durability() == v1::DURABILITY_LOCAL && host.log == nullptr) return not_served("spec.durability");
+  RETURN_IF_ERROR(check_durability(host, request.spec()));
+  if (request.spec().followers() > 0) return not_served("spec.followers");
+  if (host.cluster != nullptr && spec.durability == Durability::kLocal) spec.durability = Durability::kReplicated;
   spec.pinned_bytes = host.pinned_limit();
   spec.creator = creator_name(caller);
   const std::string& static_from = request.spec().static_from();
@@ -200,6 +217,7 @@ absl::Status create_scene(const Caller& caller, Host& host, const v1::CreateScen
     if (const absl::StatusOr<ScenePtr> found = host.registry.find_scene(static_from); found.ok())
       source = UsedScene(*found);
   }
+  if (host.cluster != nullptr) return create_in_cluster(caller, host, request, spec, response);
   ASSIGN_OR_RETURN(const Registry::CreatedScene created, add_scene(host, request, spec));
   const UsedScene use(created.scene);
   if (!created.existed) {
@@ -242,7 +260,7 @@ v1::SceneDescription describe_structures(Host& host, const Scene& scene) {
 
 absl::Status get_scene(const Caller& caller, Host& host, const v1::GetSceneRequest& request,
                        v1::GetSceneResponse& response) {
-  ASSIGN_OR_RETURN(const ScenePtr scene, find_scene(host, caller, request.name(), "name"));
+  ASSIGN_OR_RETURN(const ScenePtr scene, find_scene(host, caller, request.name(), "name", LookUp::kMayWait));
   RETURN_IF_ERROR(check_work(caller));
   *response.mutable_scene() = describe(host, caller, *scene);
   *response.mutable_description() = describe_structures(host, *scene);
@@ -252,7 +270,7 @@ absl::Status get_scene(const Caller& caller, Host& host, const v1::GetSceneReque
 absl::Status update_scene(const Caller& caller, Host& host, const v1::UpdateSceneRequest& request,
                           v1::UpdateSceneResponse& response) {
   caller.set_subject(request.name());
-  ASSIGN_OR_RETURN(const UsedScene scene, use_scene(host, caller, request.name(), "name"));
+  ASSIGN_OR_RETURN(const UsedScene scene, use_scene(host, caller, request.name(), "name", LookUp::kMayWait));
   RETURN_IF_ERROR(check_work(caller));
   ASSIGN_OR_RETURN(const SettingsChange change, to_settings(request));
   ASSIGN_OR_RETURN(const SceneSettings settings, scene->change_settings(change));
@@ -265,7 +283,13 @@ absl::Status update_scene(const Caller& caller, Host& host, const v1::UpdateScen
 absl::Status delete_mesh(const Caller& caller, Host& host, const v1::DeleteMeshRequest& request) {
   RETURN_IF_ERROR(check_mesh_name(request.mesh(), "mesh"));
   caller.set_subject(request.mesh());
-  RETURN_IF_ERROR(host.registry.delete_mesh(request.mesh()));
+  absl::Status deleted = host.registry.delete_mesh(request.mesh());
+  // In a cluster, this server need not have read the mesh.
+  if (absl::IsNotFound(deleted) && host.cluster != nullptr) {
+    RETURN_IF_ERROR(find_mesh(host, request.mesh()).status());
+    deleted = host.registry.delete_mesh(request.mesh());
+  }
+  RETURN_IF_ERROR(deleted);
   log(LogLevel::kInfo, "mesh deleted", {{"mesh", request.mesh()}});
   return absl::OkStatus();
 }
@@ -371,6 +395,7 @@ v1::Scene describe(Host& host, const Caller& caller, const Scene& scene) {
   const uint32_t pending = std::max(out.pending_changes(), host.changes.pending(out.epoch()));
   out.set_pending_changes(pending);
   out.set_state(pending > 0 ? v1::SCENE_STATE_BUILDING : v1::SCENE_STATE_READY);
+  if (host.cluster != nullptr) *out.mutable_placement() = host.cluster->placement_of(scene);
   return out;
 }
 

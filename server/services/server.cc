@@ -11,6 +11,7 @@
 #include <thread>
 #include <utility>
 
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "core/base/check.h"
 #include "core/base/status_macros.h"
@@ -23,6 +24,8 @@
 #include "server/rpc/io_threads.h"
 #include "server/services/access.h"
 #include "server/services/backup.h"
+#include "server/services/cluster/cluster_meshes.h"
+#include "server/services/cluster/cluster_scenes.h"
 #include "server/services/connections.h"
 #include "server/services/health_service.h"
 #include "server/services/query_service.h"
@@ -54,6 +57,8 @@ constexpr int kPingAnswerMs = 10'000;
 // Minimum interval in milliseconds between keepalive pings from a client. With these pings a client detects that this
 // server is unreachable.
 constexpr int kMinPingIntervalMs = 5'000;
+// Time that a member of a cluster has to hand its scenes over, even if the grace period is shorter.
+constexpr std::chrono::seconds kHandOverWait{5};
 // Maximum time that gRPC has, after all calls have ended, to send the last statuses and to end the health watchers.
 constexpr milliseconds kLastWords{500};
 
@@ -102,6 +107,15 @@ void set_limits(const ServerConfig& config, grpc::ServerBuilder& builder) {
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, kMinPingIntervalMs);
 }
 
+// Returns the address at which the other members of a cluster reach this server.
+std::string advertised_address(const ServerConfig& config, const std::vector<std::string>& listening) {
+  if (!config.advertise.empty()) return config.advertise;
+  const auto tcp = std::find_if(listening.begin(), listening.end(),
+                                [](const std::string& address) { return !absl::StartsWith(address, "unix:"); });
+  LOCUS_CHECK(tcp != listening.end());  // checked with the options
+  return *tcp;
+}
+
 }  // namespace
 
 struct Server::Parts {
@@ -119,6 +133,20 @@ struct Server::Parts {
     blocking_calls.add(reflection_method(host));
   }
 
+  ~Parts() {
+    if (storage != nullptr) storage->fences->deliver_to(nullptr);
+  }
+
+  // Makes the server a member of a cluster, which does not begin to lead yet.
+  void join(ClusterStorage& with, const std::string& address) {
+    storage = &with;
+    meshes = std::make_unique<ClusterMeshes>(host, *with.log);
+    cluster = std::make_unique<ClusterScenes>(host, with, address);
+    host.cluster_meshes = meshes.get();
+    host.cluster = cluster.get();
+    with.fences->deliver_to([this](SceneKey scene, uint64_t token) { cluster->fenced(scene, token); });
+  }
+
   // Declared first and so destroyed last, because work that ends while `host` is destroyed may post to the loops.
   std::unique_ptr<IoThreads> io;
   Host host;
@@ -131,6 +159,10 @@ struct Server::Parts {
   std::unique_ptr<Connections> connections;  // destroyed after the gRPC server, which reads from them
   std::unique_ptr<grpc::Server> grpc;
   std::unique_ptr<HttpServer> http;  // started before the first call is served, ended after the last call
+  // The part in a cluster; null without one. Declared after `host`, which it uses.
+  ClusterStorage* storage = nullptr;
+  std::unique_ptr<ClusterMeshes> meshes;
+  std::unique_ptr<ClusterScenes> cluster;
   bool ended = false;
 };
 
@@ -141,11 +173,12 @@ Server::~Server() {
 }
 
 absl::StatusOr<std::unique_ptr<Server>> Server::start(const ServerConfig& config, UpdateLog* log,
-                                                      const std::atomic<bool>& stop) {
+                                                      const std::atomic<bool>& stop, ClusterStorage* cluster) {
   auto parts = std::make_unique<Parts>(config, log);
   ASSIGN_OR_RETURN(parts->access, Access::open(config, parts->host));
   ASSIGN_OR_RETURN(parts->connections, Connections::listen(config, parts->host));
   if (can_back_up(parts->host)) remove_leftover_backup(parts->host);
+  if (cluster != nullptr) parts->join(*cluster, advertised_address(config, parts->connections->addresses()));
   parts->host.recovering = log != nullptr;
   ASSIGN_OR_RETURN(std::unique_ptr<HttpServer> http, start_http(config, parts->connections->tls(), parts->scrape));
   parts->http = std::move(http);
@@ -176,6 +209,7 @@ absl::StatusOr<std::unique_ptr<Server>> Server::start(const ServerConfig& config
   Host& host = server->parts_->host;
   if (log != nullptr) RETURN_IF_ERROR(recover_all(host, stop));
   host.start_lifetimes();
+  if (cluster != nullptr) server->parts_->cluster->start();
   host.recovering = false;
   server->parts_->health_service.serving();
   server->parts_->scrape.serving(server->addresses());
@@ -205,6 +239,8 @@ void Server::drain(milliseconds grace, const std::function<void()>& before_closi
   Host& host = parts_->host;
   // Accept new connections until all calls have ended or `deadline` has passed, so that probes get NOT_SERVING.
   parts_->health_service.not_serving();
+  // Calls are served until the scenes are handed over.
+  if (parts_->cluster != nullptr) parts_->cluster->drain(std::max(deadline, steady_clock::now() + kHandOverWait));
   host.drain.begin();
   host.lifetimes.stop();
   host.lease_ends.stop();

@@ -24,6 +24,8 @@ class ChannelArguments;
 
 namespace locus::server {
 
+struct ClusterStorage;
+
 class Server {
  public:
   // Starts a server that listens on all addresses of `config`. If there are none, only callers in this process can call
@@ -32,9 +34,11 @@ class Server {
   // returns an error that names the address and the reason. Scenes are stored in `log`, which must outlive the server;
   // if `log` is null, scenes are stored in memory only. The scenes of the log are recovered before start() returns;
   // meanwhile calls are answered with REASON_RECOVERING. Returns CANCELLED soon after `stop` becomes true during
-  // recovery.
+  // recovery. With `cluster`, which must outlive the server and whose log `log` is, the server is a member of a
+  // cluster: it reads the scenes that it is given to lead, after start() has returned.
   static absl::StatusOr<std::unique_ptr<Server>> start(const ServerConfig& config, UpdateLog* log = nullptr,
-                                                       const std::atomic<bool>& stop = kNever);
+                                                       const std::atomic<bool>& stop = kNever,
+                                                       ClusterStorage* cluster = nullptr);
 
   // Drains without a grace period if drain() was not called.
   ~Server();

@@ -14,6 +14,8 @@
 #include "server/rpc/wire_plan.h"
 #include "server/scheduling/allocator_use.h"
 #include "server/services/backup.h"
+#include "server/services/cluster/cluster_scenes.h"
+#include "server/services/cluster_calls.h"
 #include "server/services/connections.h"
 #include "server/services/quota_report.h"
 
@@ -22,7 +24,8 @@ namespace {
 
 bool serves(const Host& host, absl::string_view feature) {
   if (feature == kBackupFeature) return can_back_up(host);
-  return feature != "durability_local" || host.log != nullptr;
+  if (feature == "durability_replicated") return host.cluster != nullptr;
+  return feature != "durability_local" || (host.log != nullptr && host.cluster == nullptr);
 }
 
 struct NamedLimit {
@@ -159,14 +162,38 @@ void get_server(Host& host, const Caller& caller, v1::GetServerResponse& respons
   const bool shows_use = caller.may(Right::kMetrics, "") || caller.administers_all();
   response.set_version(kVersion);
   response.set_instruction_set(std::string(instruction_set()));
-  for (const absl::string_view feature : {"after_t",      "anchors",    "as_of",         "backup",
-                                          "balls",        "boxes",      "by_list",       "capsules",
-                                          "cell_size",    "cells",      "compounds",     "contains",
-                                          "continues",    "count_only", "download_mesh", "durability_local",
-                                          "expire_ticks", "frustums",   "history",       "idle_ttl",
-                                          "latest_wins",  "leases",     "lookup",        "mesh_grace",
-                                          "nearest",      "pairs",      "rays",          "sight",
-                                          "static_from",  "step",       "sweeps"})
+  for (const absl::string_view feature : {"after_t",
+                                          "anchors",
+                                          "as_of",
+                                          "backup",
+                                          "balls",
+                                          "boxes",
+                                          "by_list",
+                                          "capsules",
+                                          "cell_size",
+                                          "cells",
+                                          "compounds",
+                                          "contains",
+                                          "continues",
+                                          "count_only",
+                                          "download_mesh",
+                                          "durability_local",
+                                          "durability_replicated",
+                                          "expire_ticks",
+                                          "frustums",
+                                          "history",
+                                          "idle_ttl",
+                                          "latest_wins",
+                                          "leases",
+                                          "lookup",
+                                          "mesh_grace",
+                                          "nearest",
+                                          "pairs",
+                                          "rays",
+                                          "sight",
+                                          "static_from",
+                                          "step",
+                                          "sweeps"})
     if (serves(host, feature)) response.add_features(std::string(feature));
   for (const NamedLimit& limit : limits_of(host)) {
     v1::Limit* out = response.add_limits();
@@ -180,6 +207,7 @@ void get_server(Host& host, const Caller& caller, v1::GetServerResponse& respons
   response.set_use_hidden(!shows_use);
   response.set_http_port(host.http_port);
   response.set_http_host(host.http_host);
+  if (host.cluster != nullptr) *response.mutable_cluster() = host.cluster->describe();
 }
 
 }  // namespace
@@ -209,10 +237,19 @@ std::vector<BlockingMethod> server_methods(Host& host) {
       streaming_body<v1::BackupRequest>([&host](const Caller& caller, const v1::BackupRequest&, MessageStream& stream) {
         return back_up(host, caller, stream);
       });
+  BlockingMethod move;
+  move.path = "/locus.v1.ServerService/MoveScene";
+  move.rpc = Rpc::kMoveScene;
+  move.is_change = true;
+  move.body = unary_body<v1::MoveSceneRequest, v1::MoveSceneResponse>(
+      [&host](const Caller& caller, const v1::MoveSceneRequest& request, v1::MoveSceneResponse& response) {
+        return move_scene(caller, host, request, response);
+      });
   std::vector<BlockingMethod> methods;
   methods.push_back(std::move(get));
   methods.push_back(std::move(quotas));
   methods.push_back(std::move(backup));
+  methods.push_back(std::move(move));
   return methods;
 }
 

@@ -7,6 +7,7 @@
 #include <grpcpp/security/credentials.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <chrono>
 #include <memory>
 #include <string>
@@ -63,11 +64,13 @@ inline server::ServerConfig test_config() {
 
 class RunningServer {
  public:
-  // Starts the server. `log`, which may be null, must outlive the server.
-  explicit RunningServer(const server::ServerConfig& config = test_config(), UpdateLog* log = nullptr) {
+  // Starts the server. `log` and `cluster`, which may be null, must outlive the server.
+  explicit RunningServer(const server::ServerConfig& config = test_config(), UpdateLog* log = nullptr,
+                         server::ClusterStorage* cluster = nullptr) {
     server::start_logging(config.log_level, config.log_format);
     server::capture_library_logs(config.log_level);
-    absl::StatusOr<std::unique_ptr<server::Server>> started = server::Server::start(config, log);
+    absl::StatusOr<std::unique_ptr<server::Server>> started = 
+        server::Server::start(config, log, kNever, cluster);
     if (!started.ok()) ADD_FAILURE() << started.status();
     LOCUS_CHECK(started.ok());
     server_ = *std::move(started);
@@ -79,6 +82,8 @@ class RunningServer {
   Stubs& stubs() { return *stubs_; }
 
  private:
+  static inline const std::atomic<bool> kNever{false};
+
   std::unique_ptr<server::Server> server_;
   std::unique_ptr<Stubs> stubs_;
 };

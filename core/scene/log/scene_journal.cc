@@ -9,12 +9,20 @@
 namespace locus {
 namespace {
 
+constexpr uint32_t kFencedRetryMs = 50;
+
 // The largest batch and the largest static change fit into a record. The values of one item take at most 128 bytes in
 // all columns together, and the column lengths of one list take at most 256 bytes. One instance takes at most 320
 // bytes, including the hash, the name and the bounds of its mesh.
 static_assert(uint64_t{limits::kMaxUpdateItems} * 128 + uint64_t{limits::kMaxUpdateLists} * 256 <=
               UpdateLog::kMaxRecordBytes);
 static_assert(uint64_t{limits::kMaxInstances} * 320 <= UpdateLog::kMaxRecordBytes);
+
+// Returns the error for the caller of a change: another server leads the scene if the log is fenced.
+absl::Status for_caller(absl::Status status) {
+  if (!absl::IsAborted(status)) return status;
+  return no_leader("another server has become the leader of the scene, and nothing was changed", kFencedRetryMs);
+}
 
 }  // namespace
 
@@ -68,7 +76,7 @@ absl::Status SceneJournal::append(AckLevel level) {
   }
   if (status.ok()) {
     const absl::StatusOr<uint64_t> last = log_.log->append(log_.key, entries_, level);
-    status = last.status();
+    status = for_caller(last.status());
     if (status.ok()) {
       const MutexLock lock(mutex_);
       position_.sequence += entries_.size();
@@ -86,10 +94,10 @@ absl::Status SceneJournal::append(AckLevel level) {
 }
 
 absl::Status SceneJournal::set_spec(absl::string_view spec) {
-  return on() ? log_.log->set_scene_spec(log_.key, spec) : absl::OkStatus();
+  return on() ? for_caller(log_.log->set_scene_spec(log_.key, spec)) : absl::OkStatus();
 }
 
-absl::Status SceneJournal::remove() { return on() ? log_.log->delete_scene(log_.key) : absl::OkStatus(); }
+absl::Status SceneJournal::remove() { return on() ? for_caller(log_.log->delete_scene(log_.key)) : absl::OkStatus(); }
 
 LogPosition SceneJournal::position() const {
   const MutexLock lock(mutex_);

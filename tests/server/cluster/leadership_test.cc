@@ -231,11 +231,18 @@ TEST_F(LeadershipTest, TheLastMemberReleasesItsScenesAndTheNextOneLeadsThem) {
 
 TEST_F(LeadershipTest, AMoveGoesToAFollowerWithAllRecords) {
   create_at(*daemons_[0], 1);
-  EXPECT_EQ(move(*daemons_[0], 1, daemons_[1]->id())->code(), absl::StatusCode::kFailedPrecondition) << "no follower";
   EXPECT_EQ(move(*daemons_[1], 1, daemons_[2]->id())->code(), absl::StatusCode::kNotFound) << "not the leader";
   follow(*daemons_[1], 1);
+  EXPECT_EQ(move(*daemons_[0], 1, daemons_[2]->id())->code(), absl::StatusCode::kFailedPrecondition) << "no follower";
   EXPECT_EQ(move(*daemons_[0], 1, daemons_[1]->id()), absl::OkStatus());
   EXPECT_EQ(leader(1), daemons_[1]);
+  EXPECT_EQ(cluster_.unled({1}), "");
+}
+
+TEST_F(LeadershipTest, ASceneWithoutFollowersMovesToAnyLivingMember) {
+  create_at(*daemons_[0], 1);
+  EXPECT_EQ(move(*daemons_[0], 1, daemons_[2]->id()), absl::OkStatus());
+  EXPECT_EQ(leader(1), daemons_[2]);
   EXPECT_EQ(cluster_.unled({1}), "");
 }
 

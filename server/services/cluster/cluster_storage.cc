@@ -1,0 +1,28 @@
+#include "server/services/cluster/cluster_storage.h"
+
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/status_macros.h"
+#include "server/storage/postgres/engine_address.h"
+
+namespace locus::server {
+
+absl::StatusOr<ClusterStorage> open_cluster(const ServerConfig& config) {
+  ClusterStorage storage;
+  ASSIGN_OR_RETURN(const EngineAddress address, EngineAddress::parse(config.cluster));
+  for (size_t host = 0; host < address.host_count(); ++host)
+    absl::StrAppend(&storage.hosts, host == 0 ? "" : ",", address.host_name(host));
+  storage.fences = std::make_unique<FenceNotices>();
+  PostgresOptions options;
+  options.url = config.cluster;
+  options.replication =
+      config.engine_replication == ReplicatedBy::kStorage ? EngineReplication::kStorage : EngineReplication::kStandbys;
+  options.list_catalogue = false;
+  options.on_fenced = [fences = storage.fences.get()](SceneKey scene, uint64_t token) { fences->notify(scene, token); };
+  ASSIGN_OR_RETURN(storage.log, PostgresLog::open(options));
+  ASSIGN_OR_RETURN(storage.engine, PostgresCluster::open(options));
+  return storage;
+}
+
+}  // namespace locus::server

@@ -1,0 +1,50 @@
+// The engine of a cluster as main() opens it: the log of the scenes, and the tables of members and leaders.
+#ifndef LOCUS_SERVER_SERVICES_CLUSTER_CLUSTER_STORAGE_H_
+#define LOCUS_SERVER_SERVICES_CLUSTER_CLUSTER_STORAGE_H_
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "core/base/mutex.h"
+#include "server/config/server_config.h"
+#include "server/storage/postgres_cluster.h"
+#include "server/storage/postgres_log.h"
+
+namespace locus::server {
+
+// Connects the log with whoever leads the scenes, which begins after the log was opened and ends before it is closed.
+// Any thread may call the members.
+class FenceNotices {
+ public:
+  using Receiver = std::function<void(SceneKey, uint64_t token)>;
+
+  // Sets the function that is called for each leadership that was fenced; null: nobody. Waits for a running call.
+  void deliver_to(Receiver receiver) LOCUS_EXCLUDES(mutex_) {
+    const MutexLock lock(mutex_);
+    receiver_ = std::move(receiver);
+  }
+  void notify(SceneKey scene, uint64_t token) LOCUS_EXCLUDES(mutex_) {
+    const MutexLock lock(mutex_);
+    if (receiver_ != nullptr) receiver_(scene, token);
+  }
+
+ private:
+  Mutex mutex_;
+  Receiver receiver_ LOCUS_GUARDED_BY(mutex_);
+};
+
+struct ClusterStorage {
+  std::unique_ptr<FenceNotices> fences;  // before the log, which calls it
+  std::unique_ptr<PostgresLog> log;
+  std::unique_ptr<PostgresCluster> engine;
+  std::string hosts;  // of the engine, without user and password
+};
+
+// Connects to the engine that config.cluster names. Errors: those of PostgresLog::open().
+absl::StatusOr<ClusterStorage> open_cluster(const ServerConfig& config);
+
+}  // namespace locus::server
+
+#endif  // LOCUS_SERVER_SERVICES_CLUSTER_CLUSTER_STORAGE_H_
