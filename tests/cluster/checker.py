@@ -7,16 +7,18 @@ may show an update of unknown outcome wherever its bounds allow a missing revisi
 """
 import collections
 import dataclasses
+import itertools
 
 from history import AT_LEAST, EXACTLY, FAILED, NEVER, OK, READ, TOKEN, UNKNOWN, UPDATE
-from updates import (ANYTHING, Model, PrefixMaximum, bound_by_numbers, first_unfilled, first_without_place, join_attempts)
+from updates import (ANYTHING, MAYBE, NO, YES, Model, PrefixMaximum, bound_by_numbers, first_unfilled, first_without_place,
+                     join_attempts, keeps_ack)
 
 RULES = {
     "unique": "two updates never have the same revision",
     "dense": "each revision of an epoch was made by an update",
     "committed": "a read shows only revisions that an update made before the read ended",
     "real_time": "an update that was acknowledged before another one was sent has the lower revision",
-    "epoch": "a takeover keeps the epoch",
+    "epoch": "a takeover keeps the epoch, and without a log an old epoch ends when the next one begins",
     "once": "an update is applied at most once, however often it is sent",
     "same_ack": "a numbered batch that is sent again gets the ack of the first time",
     "writers": "the batches of a writer are applied in the order of their numbers, without a gap",
@@ -72,7 +74,7 @@ def check(history, hidden=frozenset()):
     found = []
     for scene, numbers in scenes.items():
         findings = Findings()
-        SceneCheck(history.calls, numbers, hidden, findings).run(may_restart=scene in history.memory_scenes)
+        SceneCheck(history.calls, numbers, hidden, findings).run(scene in history.memory_scenes, history.partitions)
         found += findings.kept
     return found
 
@@ -88,7 +90,9 @@ class SceneCheck:
         self.tokens = [number for number in shown if calls[number].kind == TOKEN and calls[number].outcome == OK]
         self.updates = join_attempts(calls, numbers, hidden)
 
-    def run(self, may_restart):
+    def run(self, may_restart, partitions):
+        # Two daemons may lead a scene without a log during these.
+        self.partitions = partitions if may_restart else []
         epochs = sorted({self.calls[number].epoch for number in self.reads + self.acks} |
                         {update.epoch for update in self.updates if update.epoch is not None},
                         key=lambda epoch: min(self.calls[number].begin for number in self.of_epoch(epoch)))
@@ -99,6 +103,8 @@ class SceneCheck:
         self.check_repeats()
         self.check_tokens()
         self.check_equal_answers()
+        if may_restart:
+            self.check_epochs(epochs)
         for position, epoch in enumerate(epochs):
             EpochCheck(self, epoch, first=position == 0, only=len(epochs) == 1).run()
 
@@ -117,7 +123,7 @@ class SceneCheck:
                 self.add("max_age", f"#{number} is {call.age_ms} ms old, and allowed {call.max_age_ms}", number)
 
     def check_repeats(self):
-        """Compares the acks of the attempts of one batch. An ack that the server has no longer has no counts."""
+        """Compares the acks of the attempts of one batch."""
         shown = set(self.acks)
         for update in self.updates:
             acks = [number for number in update.attempts if number in shown]
@@ -125,7 +131,7 @@ class SceneCheck:
             if len(firsts) > 1:
                 self.add("once", f"writer {update.writer}, batch {update.batch} was acknowledged as new by " +
                          " and ".join(f"#{number}" for number in firsts), *firsts)
-            whole = [number for number in acks if not (self.calls[number].duplicate and self.calls[number].applied == 0)]
+            whole = [number for number in acks if keeps_ack(self.calls[number])]
             kept = {number: (self.calls[number].epoch, self.calls[number].revision, self.calls[number].tick,
                              self.calls[number].applied, self.calls[number].refused) for number in whole}
             for number in whole[1:]:
@@ -138,15 +144,12 @@ class SceneCheck:
         led = [number for number in named if self.calls[number].kind == UPDATE or self.calls[number].leader_only]
         sources = collections.defaultdict(list)
         for number in named:
-            sources[f"daemon {self.calls[number].daemon}"].append(number)
-        sources["the leader"] = led
-        for source, numbers in sources.items():
-            seen = PrefixMaximum((self.calls[number].end, self.calls[number].token, number) for number in numbers)
-            for number in numbers:
-                best = seen.before(self.calls[number].begin)
-                if best and best[0] > self.calls[number].token:
-                    self.add("token", f"{source} named {best[0]} in #{best[1]} and later "
-                             f"{self.calls[number].token} in #{number}", best[1], number)
+            sources[self.calls[number].daemon].append(number)
+        sources.pop("", None)
+        for daemon, numbers in sources.items():
+            self.check_tokens_of(f"daemon {daemon} named", numbers, numbers)
+        self.check_tokens_of("the scene had", named, [number for number in led if self.needs_leader(number) and
+                                                      not self.in_partition(number)])
         leaders = {}
         for number in led:
             call = self.calls[number]
@@ -155,7 +158,77 @@ class SceneCheck:
                 self.add("token", f"{self.calls[other].daemon} in #{other} and {call.daemon} in #{number} both led "
                          f"with token {call.token}", other, number)
         self.check_tokens_of_acks(sorted((self.calls[number].epoch, self.calls[number].revision, number) for number in led
-                                         if self.calls[number].kind == UPDATE and not self.calls[number].duplicate))
+                                         if self.calls[number].kind == UPDATE and self.changes_something(number)))
+
+    def check_tokens_of(self, source, witnesses, numbers):
+        """Checks that calls name no lower token than one that a witness had named before they were sent."""
+        seen = PrefixMaximum((self.calls[number].end, self.calls[number].token, number) for number in witnesses)
+        for number in numbers:
+            best = seen.before(self.calls[number].begin)
+            if best and best[0] > self.calls[number].token:
+                self.add("token", f"{source} token {best[0]} in #{best[1]}, and later #{number} has "
+                         f"{self.calls[number].token}", best[1], number)
+
+    def changes_something(self, number):
+        call = self.calls[number]
+        return bool(call.changes) and not call.duplicate and call.applied != 0
+
+    def needs_leader(self, number):
+        """Returns whether only the present leader can have given an answer. A leader that was deposed without knowing it may
+        tell of a batch that had been applied before, but commits nothing more.
+        """
+        return self.calls[number].kind == READ or self.changes_something(number)
+
+    def in_partition(self, number):
+        call = self.calls[number]
+        return any(call.begin < end and call.end > begin for begin, end in self.partitions)
+
+    def check_epochs(self, epochs):
+        """Checks that a scene without a log is not answered in an old epoch after a newer one: at no time by one daemon or to
+        one client, and after an ack by no daemon, if none was cut off.
+        """
+        tokens = collections.defaultdict(list)
+        first, last = collections.defaultdict(dict), collections.defaultdict(dict)  # source -> epoch -> (time, call)
+        for number in self.reads + self.acks:
+            call = self.calls[number]
+            if call.kind == UPDATE or call.leader_only:
+                tokens[call.epoch].append(call.token)
+            if call.kind == READ and call.view == EXACTLY:
+                continue
+            age = (call.age_ms or 0) * NANOSECONDS_PER_MS if call.kind == READ else 0
+            # Whether an answer shows that the epoch had begun, and whether it is wrong after a newer one.
+            for source, shows, wrong, begin in (
+                    (f"daemon {call.daemon}", bool(call.daemon), bool(call.daemon), call.begin),
+                    (f"client {call.process}", call.session, call.session and call.kind == READ, call.begin),
+                    ("the scene", call.kind == UPDATE, not self.in_partition(number), call.begin - age)):
+                if shows:
+                    first[source][call.epoch] = min(first[source].get(call.epoch, (NEVER, None)), (call.end, number))
+                if wrong:
+                    last[source][call.epoch] = max(last[source].get(call.epoch, (-NEVER, None)), (begin, number))
+        ordered = {(old, new) for old in epochs for new in epochs if old != new and tokens[old] and tokens[new] and
+                   None not in tokens[old] + tokens[new] and max(tokens[old]) < min(tokens[new])}
+        for one, two in itertools.permutations(epochs, 2):
+            self.check_two_epochs(first, last, one, two, (one, two) in ordered, (two, one) in ordered)
+
+    def check_two_epochs(self, first, last, old, new, is_older, is_newer):
+        """Adds a violation if `old` was answered after `new`. If no tokens say which of the two is older, only both orders
+        together are wrong.
+        """
+        if is_newer:
+            return
+        for source in first:
+            shown, answered = first[source].get(new), last[source].get(old)
+            if not shown or not answered or shown[0] >= answered[0]:
+                continue
+            calls = [shown[1], answered[1]]
+            if not is_older:
+                shown, answered = first[source].get(old), last[source].get(new)
+                if old > new or not shown or not answered or shown[0] >= answered[0]:
+                    continue
+                calls += [shown[1], answered[1]]
+            self.add("epoch", f"{source} was answered in epoch {new} by #{calls[0]}, and later in epoch {old} by #{calls[1]}",
+                     *calls)
+            return
 
     def check_tokens_of_acks(self, acks):
         for (epoch, _, before), (next_epoch, _, after) in zip(acks, acks[1:]):
@@ -187,19 +260,22 @@ class EpochCheck:
         self.calls, self.add, self.epoch = scene.calls, scene.add, epoch
         self.reads = [number for number in scene.reads if self.calls[number].epoch == epoch]
         self.acks = [number for number in scene.acks if self.calls[number].epoch == epoch]
-        self.known = [update for update in scene.updates if update.epoch == epoch]
-        self.applied = {}
+        self.known = [update for update in scene.updates if update.epoch == epoch and update.outcome == OK]
+        self.applied, self.ticked = {}, []
         for update in self.known:
             self.apply(update)
         # Later epochs begin with a state and a revision that the history does not know.
         self.first, self.only = first, only
         self.model = Model(self.applied, empty=first)
-        self.doubtful = [update for update in scene.updates if update.outcome == UNKNOWN and update.changes]
+        self.doubtful = [update for update in scene.updates
+                         if update.outcome == UNKNOWN and update.makes != NO and update.epoch in (None, epoch)]
         self.refused = [update for update in scene.updates if update.outcome == FAILED]
 
     def apply(self, update):
-        """Enters an acknowledged update under its revision. An update without changes makes no revision."""
-        if not update.changes:
+        """Enters an acknowledged update under its revision, if it made one."""
+        if update.makes == MAYBE:
+            self.ticked.append(update)
+        if update.makes != YES:
             return
         other = self.applied.setdefault(update.low, update)
         if other is not update and other.shown and update.shown:
@@ -226,7 +302,8 @@ class EpochCheck:
                                  for number in self.reads + self.acks)
         for update in self.doubtful:
             best = answered.before(update.begin)
-            update.low, update.high, update.seen = (best[0] if best else 0) + 1, NEVER, False
+            update.low, update.high = (best[0] if best else 0) + 1, update.latest
+            update.seen, update.certain = update.epoch is not None, update.epoch is not None and update.makes == YES
         if self.only:
             bound_by_numbers(self.known + self.doubtful)
 
@@ -234,7 +311,7 @@ class EpochCheck:
         """Finds updates by object and written position, so that a read says which update it saw."""
         self.makers = collections.defaultdict(list)
         for update in self.doubtful + self.refused + self.known:
-            for item, value in update.changes.items():
+            for item, value in (*update.changes.items(), *update.refused.items()):
                 self.makers[item, value].append(update)
 
     def check_reads(self):
@@ -275,7 +352,7 @@ class EpochCheck:
                 self.add("committed", f"#{number} shows object {item} at revision {call.revision} as #{sent} left it, "
                          f"which has revision {update.low} at the earliest", sent, number)
             return
-        update.high, update.low, update.seen = high, low, True
+        update.high, update.low, update.seen, update.certain = high, low, True, True
 
     def report_wrong(self, number, item, value, expected, since, maker):
         """Adds the violation of a read that shows what neither the model nor an update of unknown outcome says."""
@@ -284,7 +361,7 @@ class EpochCheck:
             f" of revision {since} (#{maker.attempts[-1]})" if maker else "")
         calls = [number, *(maker.attempts if maker else ())]
         for update in self.makers.get((item, value), ()):
-            if update.outcome == FAILED:
+            if update.outcome == FAILED or item in update.refused:
                 self.add("failed", f"{text}: that is #{update.attempts[0]}, which was refused", *calls, *update.attempts)
                 return
             if update.outcome == OK and update.shown and update.low > call.revision:
@@ -301,7 +378,7 @@ class EpochCheck:
         for item in shown:
             shown[item].sort()
         revisions = {item: [since for _, since, _ in entries] for item, entries in shown.items()}
-        for update in (update for update in self.doubtful if update.shown):
+        for update in (update for update in self.doubtful if update.shown and not update.conditional):
             for item, value in update.changes.items():
                 entries = shown.get(item, ())
                 index = self.last_below(revisions.get(item, ()), update.low)
@@ -329,17 +406,17 @@ class EpochCheck:
         highest_read = max(((self.calls[number].revision, number) for number in self.reads), default=(0, None))
         last = max([highest_read[0], *self.applied])
         first = 1 if self.first else min([*self.applied, *(self.calls[number].revision for number in self.reads)], default=1)
-        gaps, previous = [], first - 1
+        gaps, previous, candidates = [], first - 1, self.doubtful + self.ticked
         for revision in [*sorted(self.applied), last + 1]:
             # One more than there are candidates is enough to find that they do not suffice.
-            room = len(self.doubtful) + 1 - len(gaps)
+            room = len(candidates) + 1 - len(gaps)
             gaps += range(previous + 1, min(revision, previous + 1 + max(room, 0)))
             previous = max(previous, revision)
-        gap = first_unfilled(gaps, self.doubtful)
+        gap = first_unfilled(gaps, candidates)
         if gap is not None:
             self.report_gap(gap, highest_read)
             return
-        lost = first_without_place(gaps, [update for update in self.doubtful if update.seen]) if self.only else None
+        lost = first_without_place(gaps, [update for update in self.doubtful if update.certain]) if self.only else None
         if lost:
             sent = lost.attempts[0]
             self.add("dense", f"#{sent} was applied with a revision of {lost.low} to {lost.high}, and other updates have "
@@ -386,7 +463,7 @@ class EpochCheck:
             acked = sorted(batch for batch, update in batches.items() if update.outcome == OK)
             for before, after in zip(acked, acked[1:]):
                 low, high = batches[before], batches[after]
-                if low.low >= high.low and low.changes and high.changes and low.shown and high.shown:
+                if low.low >= high.low + (high.makes != YES) and low.shown and high.shown:
                     self.add("writers", f"writer {writer} has batch {before} at revision {low.low} (#{low.attempts[0]}) and "
                              f"batch {after} at revision {high.low} (#{high.attempts[0]})", *low.attempts, *high.attempts)
             last = acked[-1] if acked and self.only else 1
@@ -400,8 +477,7 @@ class EpochCheck:
     def check_ticks(self):
         """Compares ticks in the order of revisions. The tests of a cluster do not restart ticks."""
         told = sorted((self.calls[number].revision, self.calls[number].tick, number) for number in self.reads + self.acks
-                      if self.calls[number].tick is not None and not (self.calls[number].duplicate and
-                                                                      self.calls[number].applied == 0))
+                      if self.calls[number].tick is not None)
         for (revision, tick, before), (next_revision, next_tick, after) in zip(told, told[1:]):
             if next_tick < tick or (revision == next_revision and next_tick != tick):
                 self.add("tick", f"revision {revision} has tick {tick} (#{before}), and revision {next_revision} has tick "
@@ -421,10 +497,12 @@ class EpochCheck:
             if best and best[0] > call.revision:
                 self.add("fresh", f"#{number} with leader_only shows revision {call.revision}, and revision {best[0]} had "
                          f"been answered before by #{best[1]}", number, best[1])
-            best = acks.before(call.begin - call.age_ms * NANOSECONDS_PER_MS) if call.age_ms is not None else None
+                continue
+            age = call.age_ms or 0  # an answer without age says that it is of now
+            best = acks.before(call.begin - age * NANOSECONDS_PER_MS)
             if best and best[0] > call.revision:
                 late = (call.begin - self.calls[best[1]].end) / NANOSECONDS_PER_MS
-                self.add("age", f"#{number} shows revision {call.revision} and says age {call.age_ms} ms, and revision "
+                self.add("age", f"#{number} shows revision {call.revision} and says age {age} ms, and revision "
                          f"{best[0]} had been acknowledged {late:.3f} ms before it was asked (#{best[1]})", number, best[1])
 
     def check_sessions(self):

@@ -55,9 +55,12 @@ class Call:
     writer: int = 0             # updates: number of the writer, 0 without
     batch: int = 0              # updates: the writer's number of the batch
     changes: dict = dataclasses.field(default_factory=dict)  # updates: object id -> position, None removes the object
+    conditional: bool = False   # updates: items may be refused: moves and removes of objects that may be gone, for example
+    asked_tick: int | None = None  # updates: the tick that the batch named; with it also a batch without changes may count
     duplicate: bool = False     # updates: the ack said that the batch had been applied before
     applied: int | None = None  # updates: number of applied items in the ack
     refused: int | None = None  # updates: number of refused items in the ack
+    refused_items: list = dataclasses.field(default_factory=list)  # updates: ids of the refused items that the ack lists
     view: str = LATEST          # reads
     asked: int = 0              # reads: revision of the views AT_LEAST and EXACTLY
     leader_only: bool = False   # reads
@@ -71,8 +74,8 @@ class Call:
 
 DEFAULTS = {field.name: field.default_factory() if field.default is dataclasses.MISSING and
             field.default_factory is not dataclasses.MISSING else field.default for field in dataclasses.fields(Call)}
-ASKED = ("kind", "scene", "process", "writer", "batch", "changes", "view", "asked", "leader_only", "max_age_ms", "question",
-         "session")
+ASKED = ("kind", "scene", "process", "writer", "batch", "changes", "conditional", "asked_tick", "view", "asked", "leader_only",
+         "max_age_ms", "question", "session")
 COLUMNS = ("changes", "answer")
 
 
@@ -98,12 +101,17 @@ class History:
     seed: int = 0
     # Scenes whose epoch may change: those with DURABILITY_MEMORY. All other scenes keep their epoch.
     memory_scenes: set = dataclasses.field(default_factory=set)
+    # Pairs (begin, end): while a daemon was cut off or frozen, and a while later, a scene with DURABILITY_MEMORY may be led by
+    # two daemons, in two epochs.
+    partitions: list = dataclasses.field(default_factory=list)
 
     def write(self, file):
         """Writes the history as lines of JSON: one with the seed, then for each call one line when it begins and one when
         it ends, in the order of time.
         """
         file.write(json.dumps({"seed": self.seed, "memory_scenes": sorted(self.memory_scenes)}) + "\n")
+        for partition in self.partitions:
+            file.write(json.dumps({"partition": partition}) + "\n")
         lines = []
         for number, call in enumerate(self.calls):
             values = dataclasses.asdict(call)
@@ -126,6 +134,8 @@ class History:
                 history.seed = line["seed"]
                 history.memory_scenes |= set(line["memory_scenes"])
                 calls = {}
+            elif "partition" in line:
+                history.partitions.append(tuple(line["partition"]))
             elif "invoke" in line:
                 number, begin = line.pop("invoke"), line.pop("at")
                 calls[number] = Call(begin=begin, **from_json(line))
@@ -168,6 +178,12 @@ class Recorder:
             values = to_json({name: getattr(call, name) for name in ASKED})
             self._write({"invoke": self._numbers[id(call)], "at": call.begin, **values})
         return call
+
+    def partition(self, begin, end):
+        """Records that daemons were cut off or frozen from `begin` to `end`: see History.partitions."""
+        with self._lock:
+            self.history.partitions.append((begin, end))
+            self._write({"partition": (begin, end)})
 
     def end(self, call, outcome, **answer):
         """Records the end of a call. Call it after the answer has come."""

@@ -10,34 +10,60 @@ from history import FAILED, NEVER, OK, UNKNOWN, UPDATE
 ANYTHING = object()  # the value of an object after an update that is not shown, or before the first known update
 
 
+NO, MAYBE, YES = "no", "maybe", "yes"  # whether an update makes a revision if it is applied
+
+
+def keeps_ack(call):
+    """Returns whether the ack is the one of the first time: of a repeated batch the server may have no ack any more. Its
+    counts are 0 then, and its revision and tick are the present ones.
+    """
+    return not (call.duplicate and call.applied == 0 and not call.refused)
+
+
 class Update:
     """One batch, with all attempts to send it: calls with the same writer and batch number.
 
-    `low` and `high` bound the revision. If the update was acknowledged both are its revision. `seen` says that the update
-    must have been applied.
+    `low` and `high` bound the revision. If an ack tells the revision, both are that revision and the outcome is OK. If all
+    acks are those of a repeated batch that do not tell it, the outcome is UNKNOWN, and `latest` is the revision that had
+    contained the update by then. `seen` says that the update must have been applied, `certain` also that it has a revision of
+    its own. `changes` are without the items that the ack lists as refused, which are in `refused`.
     """
 
-    __slots__ = ("attempts", "shown", "outcome", "epoch", "begin", "acked", "low", "high", "seen", "changes", "writer", "batch")
+    __slots__ = ("attempts", "shown", "outcome", "epoch", "begin", "acked", "low", "high", "latest", "seen", "certain", "changes",
+                 "refused", "unlisted", "conditional", "makes", "writer", "batch")
 
     def __init__(self, calls, attempts, hidden, epoch=None):
         acks = [number for number in attempts if calls[number].outcome == OK and epoch in (None, calls[number].epoch)]
         shown_acks = [number for number in acks if number not in hidden]
         self.attempts = attempts
-        first = calls[(shown_acks or acks or attempts)[0]]
         # An update all of whose acks are hidden only holds its place.
         self.shown = any(number not in hidden for number in attempts) and bool(shown_acks or not acks)
+        kept = [number for number in shown_acks + acks if keeps_ack(calls[number])]
+        first = calls[min(kept, key=lambda number: calls[number].duplicate) if kept else (shown_acks or acks or attempts)[0]]
         outcomes = {calls[number].outcome for number in attempts}
-        self.outcome = OK if acks else UNKNOWN if UNKNOWN in outcomes else FAILED
+        self.outcome = OK if kept else UNKNOWN if acks or UNKNOWN in outcomes else FAILED
         self.epoch = first.epoch if acks else None
         self.begin = min(calls[number].begin for number in attempts)
         self.acked = min((calls[number].end for number in shown_acks or acks), default=NEVER)
-        self.low = self.high = first.revision if acks else None
+        self.low = self.high = first.revision if kept else None
+        self.latest = min((calls[number].revision for number in acks), default=NEVER)
         self.seen = bool(acks)
-        self.changes, self.writer, self.batch = first.changes, first.writer, first.batch
+        self.writer, self.batch, self.conditional = first.writer, first.batch, first.conditional
+        refused = (first.refused or 0) if kept else 0
+        self.refused = {item: first.changes[item] for item in first.refused_items if kept and item in first.changes}
+        self.unlisted = max(0, refused - len(first.refused_items))  # refused items that the history does not name
+        self.changes = {item: value for item, value in first.changes.items() if item not in self.refused}
+        if kept and self.unlisted >= len(self.changes):
+            self.changes, self.unlisted = {}, 0
+        if self.changes:
+            self.makes = MAYBE if self.outcome == UNKNOWN and self.conditional else YES
+        else:  # only a new tick makes a revision without changes
+            self.makes = NO if first.asked_tick is None else MAYBE
+        self.certain = self.seen and self.makes == YES
 
     def value(self, item):
         """Returns the position of an object after this update, which changes it."""
-        return self.changes[item] if self.shown else ANYTHING
+        return self.changes[item] if self.shown and not self.unlisted else ANYTHING
 
 
 def join_attempts(calls, numbers, hidden):
@@ -107,12 +133,14 @@ def bound_by_numbers(updates):
     for batches in writers.values():
         batches.sort(key=lambda update: update.batch)
         for before, after in zip(batches, batches[1:]):
-            if after.outcome == UNKNOWN and before.low is not None and after.low is not None:
-                after.low = max(after.low, before.low + 1)
+            if after.outcome == UNKNOWN:
+                own = 1 if before.outcome == OK or before.makes == YES else 0
+                after.low = max(after.low, before.low + own)
         for before, after in reversed(list(zip(batches, batches[1:]))):
-            if before.outcome == UNKNOWN and after.seen and after.high is not None:
-                own = 1 if after.changes else 0  # a batch that changes nothing has the revision before it
+            if before.outcome == UNKNOWN and after.seen:
+                own = 1 if after.makes == YES else 0  # a batch that changes nothing has the revision before it
                 before.high, before.seen = min(before.high, after.high - own), True
+                before.certain |= before.makes == YES
 
 
 def first_unfilled(gaps, candidates):
