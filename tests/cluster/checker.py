@@ -267,8 +267,8 @@ class EpochCheck:
         # Later epochs begin with a state and a revision that the history does not know.
         self.first, self.only = first, only
         self.model = Model(self.applied, empty=first)
-        self.doubtful = [update for update in scene.updates
-                         if update.outcome == UNKNOWN and update.makes != NO and update.epoch in (None, epoch)]
+        self.unknown = [update for update in scene.updates if update.outcome == UNKNOWN and update.epoch in (None, epoch)]
+        self.doubtful = [update for update in self.unknown if update.makes != NO]
         self.refused = [update for update in scene.updates if update.outcome == FAILED]
 
     def apply(self, update):
@@ -300,12 +300,12 @@ class EpochCheck:
         """
         answered = PrefixMaximum((self.calls[number].end, self.calls[number].revision, number)
                                  for number in self.reads + self.acks)
-        for update in self.doubtful:
+        for update in self.unknown:
             best = answered.before(update.begin)
             update.low, update.high = (best[0] if best else 0) + 1, update.latest
             update.seen, update.certain = update.epoch is not None, update.epoch is not None and update.makes == YES
         if self.only:
-            bound_by_numbers(self.known + self.doubtful)
+            bound_by_numbers(self.known + self.unknown)
 
     def index_values(self):
         """Finds updates by object and written position, so that a read says which update it saw."""
@@ -404,7 +404,8 @@ class EpochCheck:
     def check_revisions(self):
         """Checks that an update can have made each revision, and that each update that was seen has one."""
         highest_read = max(((self.calls[number].revision, number) for number in self.reads), default=(0, None))
-        last = max([highest_read[0], *self.applied])
+        acked = [update for update in self.known + self.unknown if update.epoch == self.epoch]
+        last = max([highest_read[0], *(update.latest for update in acked)])
         first = 1 if self.first else min([*self.applied, *(self.calls[number].revision for number in self.reads)], default=1)
         gaps, previous, candidates = [], first - 1, self.doubtful + self.ticked
         for revision in [*sorted(self.applied), last + 1]:
@@ -414,7 +415,7 @@ class EpochCheck:
             previous = max(previous, revision)
         gap = first_unfilled(gaps, candidates)
         if gap is not None:
-            self.report_gap(gap, highest_read)
+            self.report_gap(gap, highest_read, acked)
             return
         lost = first_without_place(gaps, [update for update in self.doubtful if update.certain]) if self.only else None
         if lost:
@@ -422,10 +423,15 @@ class EpochCheck:
             self.add("dense", f"#{sent} was applied with a revision of {lost.low} to {lost.high}, and other updates have "
                      "all of them", *lost.attempts)
 
-    def report_gap(self, gap, highest_read):
+    def report_gap(self, gap, highest_read, acked):
         if highest_read[0] >= gap > max(self.applied, default=0):
             self.add("committed", f"#{highest_read[1]} shows revision {highest_read[0]}, and no update can have made "
                      f"revision {gap}", highest_read[1])
+            return
+        if gap > max(self.applied, default=0):
+            last = max(acked, key=lambda update: update.latest)
+            self.add("dense", f"#{last.attempts[-1]} was answered at revision {last.latest}, and no update can have made "
+                     f"revision {gap}", *last.attempts)
             return
         after = min(revision for revision in self.applied if revision > gap)
         before = max((revision for revision in self.applied if revision < gap), default=None)
@@ -456,7 +462,7 @@ class EpochCheck:
 
     def check_writers(self):
         writers = collections.defaultdict(dict)
-        for update in self.known + self.doubtful:
+        for update in self.known + self.unknown:
             if update.writer:
                 writers[update.writer].setdefault(update.batch, update)
         for writer, batches in writers.items():

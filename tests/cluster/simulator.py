@@ -1,5 +1,6 @@
 """Simulated cluster with its clients, which makes correct histories from a seed: a leader, followers that lag, takeovers,
-updates of unknown outcome (also such that are applied long after their caller gave up), and batches that are sent again.
+updates of unknown outcome (also such that are applied long after their caller gave up), batches that are sent again, also
+after the ack was dropped, batches of which items are refused, and batches that change nothing but perhaps the tick.
 
 Time is simulated. Every update and every read takes effect at one moment between its begin and its end; the moments are
 drawn in advance and run in their order, so that the log of committed updates is the truth that all answers come from.
@@ -29,7 +30,7 @@ class Scene:
         self.name, self.leader, self.token = name, daemons[0], 1
         self.commits = [0]                                    # time of each revision
         self.numbers, self.values = {}, {}                    # object -> its revisions, and its positions
-        self.writers = {}                                     # (writer, batch) -> (revision, applied)
+        self.writers = {}                                     # (writer, batch) -> (revision, applied, refused items)
         self.applied_by_follower = {daemon: (0, 0) for daemon in daemons}  # (revision, time up to which it knows all)
 
     @property
@@ -61,14 +62,16 @@ class Scene:
 
 
 class Simulator:
-    """One run. `unknown` and `failed` are shares of the updates."""
+    """One run. `unknown` and `failed` are shares of the updates; `odd` is the share of those that move objects that may be
+    gone, and of those without changes.
+    """
 
-    def __init__(self, seed, calls, scenes=3, clients=12, unknown=0.05, failed=0.06, takeovers=8):
+    def __init__(self, seed, calls, scenes=3, clients=12, unknown=0.05, failed=0.06, takeovers=8, odd=0.06):
         self.random, self.seed, self.target = random.Random(seed), seed, calls
         self.daemons = ["d0", "d1", "d2"]
         self.scenes = [Scene(f"scene{number}", self.daemons) for number in range(scenes)]
         self.clients = clients
-        self.unknown, self.failed, self.takeovers = unknown, failed, takeovers
+        self.unknown, self.failed, self.takeovers, self.odd = unknown, failed, takeovers, odd
         self.calls, self.events, self.order, self.serial = [], [], 0, 0
         self.batches = {}        # client -> number of its last batch
         self.seen = {}           # (client, scene) -> highest revision
@@ -115,15 +118,21 @@ class Simulator:
         changes = {item: (float(self.serial), float(item), 0.5) for item in items}
         if self.random.random() < 0.05:
             changes[items[0]] = None
+        asked = {"changes": changes}
+        draw = self.random.random()
+        if draw < self.odd:
+            asked["conditional"] = True
+        elif draw < 2 * self.odd:
+            asked["changes"], asked["asked_tick"] = {}, self.random.choice((None, 7))
         numbered = self.random.random() < 0.7
         key = (client, scene.name)
         if numbered:
             self.batches[key] = self.batches.get(key, 0) + 1
         writer = 1 + client * len(self.scenes) + self.scenes.index(scene) if numbered else 0
-        self.attempt(now, client, scene, changes, writer, self.batches[key] if numbered else 0)
+        self.attempt(now, client, scene, asked, writer, self.batches[key] if numbered else 0)
 
-    def attempt(self, now, client, scene, changes, writer, batch):
-        call = self.record(Call(UPDATE, scene.name, f"p{client}", now, writer=writer, batch=batch, changes=changes))
+    def attempt(self, now, client, scene, asked, writer, batch):
+        call = self.record(Call(UPDATE, scene.name, f"p{client}", now, writer=writer, batch=batch, **asked))
         end = now + self.duration()
         draw = self.random.random()
         if draw < self.failed and not writer:
@@ -137,24 +146,32 @@ class Simulator:
                 moment = self.random.randrange(now, end) if fate < 0.4 else end + self.random.randrange(20 * MS)
                 self.at(moment, self.apply, scene, call)
             if writer:  # a client library sends it again until it has an answer
-                self.at(end + self.duration(), self.attempt, client, scene, changes, writer, batch)
+                self.at(end + self.duration(), self.attempt, client, scene, asked, writer, batch)
             else:
                 self.at(end + self.duration(), self.act, client)
         else:
             self.at(self.random.randrange(now, end), self.acknowledge, client, scene, call, end)
 
     def apply(self, now, scene, call):
-        """Applies an update, unless it was applied before. Returns (revision, applied items, whether it is a duplicate)."""
+        """Applies an update, unless it was applied before. Returns (revision, number of applied items, refused items, whether it
+        is a duplicate).
+        """
         key = (call.writer, call.batch)
         if call.writer and key in scene.writers:
-            return (*scene.writers[key], True)
-        scene.commit(now, call.changes)
+            dropped = self.random.random() < 0.3
+            return (scene.revision, 0, [], True) if dropped else (*scene.writers[key], True)
+        refused = [item for item in call.changes if call.conditional and scene.at(item, scene.revision) is None]
+        changes = {item: value for item, value in call.changes.items() if item not in refused}
+        if changes or call.asked_tick is not None and self.random.random() < 0.5:
+            scene.commit(now, changes)
+        result = (scene.revision, len(changes), refused)
         if call.writer:
-            scene.writers[key] = (scene.revision, len(call.changes))
-        return scene.revision, len(call.changes), False
+            scene.writers[key] = result
+        return *result, False
 
     def acknowledge(self, now, client, scene, call, end):
-        call.revision, call.applied, call.duplicate = self.apply(now, scene, call)
+        call.revision, call.applied, refused, call.duplicate = self.apply(now, scene, call)
+        call.refused, call.refused_items = len(refused), [item for item in refused if self.random.random() < 0.8]
         call.epoch, call.daemon, call.token, call.tick = EPOCH, scene.leader, scene.token, tick_of(call.revision)
         call.outcome, call.end = OK, end
         key = (client, scene.name)
