@@ -53,8 +53,8 @@ BROKEN = [
     ("once", "two attempts are acknowledged as new", [
         update(0, 5, 1, {1: A}, writer=4, batch=1), update(0, 5, 1, {1: A}, writer=4, batch=1)]),
     ("once", "an update of unknown outcome is shown again after it was overwritten", [
-        lost(0, {1: A}), lost(0, {2: C}), update(2, 3, 2, {2: A}), read(4, 5, 2, {1: A}), update(6, 7, 3, {1: B}), lost(6, {2: C}),
-        update(8, 9, 5, {2: B}), read(10, 11, 5, {1: A})]),
+        lost(0, {1: A}), lost(0, {2: C}), update(2, 3, 2, {2: A}), read(4, 5, 2, {1: A}), update(6, 7, 3, {1: B}),
+        lost(6, {2: C}), update(8, 9, 5, {2: B}), read(10, 11, 5, {1: A})]),
     ("once", "a repeated batch is shown before its revision", [
         update(0, 9, 1, {1: A}), lost(0, {1: B}, writer=4, batch=1), update(0, 9, 2, {1: B}, writer=4, batch=1),
         read(3, 8, 1, {1: B})]),
@@ -96,7 +96,8 @@ BROKEN = [
     ("fresh", "a leader does not show an update that had been acknowledged", [
         update(0, 1, 1, {1: A}), update(2, 3, 2, {1: B}), read(4, 5, 1, {1: A}, leader_only=True, age_ms=0)]),
     ("fresh", "a leader does not show what a leader had shown", [
-        update(0, 9, 1, {1: A}), read(1, 2, 1, {1: A}, leader_only=True), read(3, 4, 0, {1: None}, leader_only=True, process="r")]),
+        update(0, 9, 1, {1: A}), read(1, 2, 1, {1: A}, leader_only=True),
+        read(3, 4, 0, {1: None}, leader_only=True, process="r")]),
     ("age", "a read is older than it says", [
         update(0, 1, 1, {1: A}), update(2, 3, 2, {1: B}), read(3 + 3 * MS, 4 + 3 * MS, 1, {1: A}, age_ms=2)]),
     ("age", "a read without an age is old", [update(0, 1, 1, {1: A}), update(2, 3, 2, {1: B}), read(4, 5, 1, {1: A})]),
@@ -160,8 +161,8 @@ CORRECT = [
         update(0, 1, 1, {2: A}), lost(2, {1: A}, writer=4, batch=1),
         update(6, 7, 2, {1: A}, writer=4, batch=1, duplicate=True, applied=0)]),
     ("the attempt that is answered as repeated was sent before the one that is answered as new", [
-        update(0, 9, 2, {1: A}, writer=4, batch=1, duplicate=True, applied=0), update(1, 2, 1, {1: A}, writer=4, batch=1, applied=1),
-        update(3, 4, 2, {2: A}), read(10, 11, 2, {1: A, 2: A})]),
+        update(0, 9, 2, {1: A}, writer=4, batch=1, duplicate=True, applied=0),
+        update(1, 2, 1, {1: A}, writer=4, batch=1, applied=1), update(3, 4, 2, {2: A}), read(10, 11, 2, {1: A, 2: A})]),
     ("items of a batch are refused, and the ack names them", [
         update(0, 1, 1, {1: A}), update(2, 3, 2, {1: B, 2: B}, conditional=True, applied=1, refused=1, refused_items=[2]),
         read(4, 5, 2, {1: B, 2: None})]),
@@ -219,7 +220,8 @@ MEMORY_CORRECT = [
     ("a client asks for the old epoch by its revision", [
         update(0, 1, 1, {1: A}), update(2, 3, 1, {1: B}, epoch=2), read(4, 5, 1, {1: A}, view=EXACTLY, asked=1)]),
     ("a follower reads the old epoch and says its age", [
-        led(0, 1, 1, {1: A}, 1, "d0"), led(2, 3, 1, {1: B}, 2, "d1", epoch=2), read(3 + 3 * MS, 4 + 3 * MS, 1, {1: A}, age_ms=4)]),
+        led(0, 1, 1, {1: A}, 1, "d0"), led(2, 3, 1, {1: B}, 2, "d1", epoch=2),
+        read(3 + 3 * MS, 4 + 3 * MS, 1, {1: A}, age_ms=4)]),
 ]
 PARTITION = [led(0, 1, 1, {1: A}, 1, "d0"), led(2, 3, 1, {1: B}, 2, "d1", epoch=2), led(4, 5, 2, {1: C}, 1, "d0", process="r")]
 

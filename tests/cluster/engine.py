@@ -73,13 +73,19 @@ def quick_folder():
     return tempfile.gettempdir()
 
 
-def free_port():
-    """Returns a port of loopback that no process uses."""
+def hold_port():
+    """Returns a socket that holds a port of loopback that no process uses. A server that sets SO_REUSEADDR, as PostgreSQL and
+    locusd do, can listen at the port, and no other hold_port() gets it, also while the server is down.
+    """
     while True:
-        with socket.socket() as probe, contextlib.suppress(OSError):
-            port = random.SystemRandom().choice(PORTS)
-            probe.bind(("127.0.0.1", port))
-            return port
+        holder = socket.socket()
+        try:
+            holder.bind(("127.0.0.1", random.SystemRandom().choice(PORTS)))
+        except OSError:
+            holder.close()
+            continue
+        holder.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # after bind(), which so took no port that is held
+        return holder
 
 
 def wait_for(condition, seconds, what):
@@ -102,7 +108,8 @@ class Node:
 
     def __init__(self, name, folder):
         self.name, self.folder, self.data = name, folder, os.path.join(folder, name)
-        self.port = free_port()
+        self.holder = hold_port()
+        self.port = self.holder.getsockname()[1]
         self.process, self.state, self.follows, self.stale = None, DOWN, None, False
 
     def __repr__(self):
@@ -150,6 +157,7 @@ class Engine:
             if node.process:
                 with contextlib.suppress(subprocess.TimeoutExpired):
                     node.process.wait(timeout=10)
+            node.holder.close()
 
     # Processes and files.
 

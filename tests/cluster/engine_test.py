@@ -7,10 +7,13 @@ without synchronous commit, the same test loses records; and whatever ends the t
 LOCUS_CLUSTER_HISTORY names a file for the whole history; shrink.py judges it again.
 Exits 77, which counts as skipped, if PostgreSQL or psycopg2 is missing.
 """
+import math
 import os
+import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 import unittest
 
@@ -213,6 +216,8 @@ from keeper import end_in_order, family
 end_in_order()
 with Engine(life_seconds=float(sys.argv[1])) as engine:
     print(engine.folder, *(pid for node in engine.nodes for pid in family(node.process.pid)), flush=True)
+    if sys.argv[2] == "life":
+        engine.keeper.set_life(1)
     if sys.argv[2] == "frozen":
         engine.freeze(engine.primary)
     if sys.argv[2] in ("frozen", "raise"):
@@ -222,24 +227,29 @@ with Engine(life_seconds=float(sys.argv[1])) as engine:
 
 
 class EndTest(unittest.TestCase):
-    def end(self, how, life_seconds=100):
+    def end(self, how):
         """Starts a test with an engine and ends it in some way. Nothing of it may be left soon after."""
-        child = subprocess.Popen([sys.executable, "-B", "-c", CHILD, str(life_seconds), how], stdout=subprocess.PIPE, text=True,
+        child = subprocess.Popen([sys.executable, "-B", "-c", CHILD, str(LIFE_SECONDS), how], stdout=subprocess.PIPE, text=True,
                                  stderr=subprocess.DEVNULL)
         with child.stdout:
-            folder, *pids = child.stdout.readline().split()
-            started = {pid: started_at(pid) for pid in pids}
-            self.assertGreater(len(pids), 3)
+            line = child.stdout.readline()
+            started = {pid: started_at(pid) for pid in line.split()[1:]}
             if how.startswith("SIG"):
                 child.send_signal(getattr(signal, how))
             if how != "life":
                 child.wait(timeout=60)
-            until = time.monotonic() + 60
-            while os.path.exists(folder) or any(start is not None and started_at(pid) == start for pid, start in started.items()):
-                self.assertLess(time.monotonic(), until, f"after {how} something is left: {folder} {pids}")
-                time.sleep(0.05)
+            self.wait_until_gone(how, line, started)
             child.kill()
             child.wait()
+
+    def wait_until_gone(self, how, line, started):
+        """Waits until the folder and the processes of a CHILD that printed `line` are gone. `started` are the processes."""
+        folder, *pids = line.split()
+        self.assertGreater(len(pids), 3)
+        until = time.monotonic() + 60
+        while os.path.exists(folder) or any(start is not None and started_at(pid) == start for pid, start in started.items()):
+            self.assertLess(time.monotonic(), until, f"after {how} something is left: {line}")
+            time.sleep(0.05)
 
     def test_nothing_is_left_after_an_exception(self):
         self.end("raise")
@@ -254,7 +264,29 @@ class EndTest(unittest.TestCase):
         self.end("SIGKILL")
 
     def test_nothing_is_left_when_its_life_is_over(self):
-        self.end("life", life_seconds=8)
+        self.end("life")
+
+    @unittest.skipUnless(shutil.which("ctest"), "ctest is missing")
+    def test_nothing_is_left_after_a_timeout_of_ctest(self):
+        with tempfile.TemporaryDirectory() as folder:
+            told = os.path.join(folder, "told")
+            with open(os.path.join(folder, "child.py"), "w", encoding="utf-8") as file:
+                file.write(CHILD.replace("import sys, time", f"import sys, time\nsys.stdout = open({told!r}, 'w')"))
+            with open(os.path.join(folder, "CTestTestfile.cmake"), "w", encoding="utf-8") as file:
+                file.write(f"add_test(child {sys.executable} -B {folder}/child.py {LIFE_SECONDS} ctest)\n"
+                           f"set_tests_properties(child PROPERTIES TIMEOUT {self.seconds_to_start() + 3})\n")
+            result = subprocess.run(["ctest"], cwd=folder, stdout=subprocess.PIPE, text=True, timeout=300, check=False)
+            self.assertIn("Timeout", result.stdout)
+            with open(told, encoding="utf-8") as file:
+                line = file.read()
+            self.wait_until_gone("a timeout of ctest", line, {pid: started_at(pid) for pid in line.split()[1:]})
+
+    @staticmethod
+    def seconds_to_start():
+        """Returns how long an engine takes to start here, rounded up."""
+        start = time.monotonic()
+        Engine(life_seconds=LIFE_SECONDS).close()
+        return math.ceil(time.monotonic() - start)
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ import unittest
 sys.dont_write_bytecode = True
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 
+from engine import hold_port  # noqa: E402
 from engine_faults import EngineFaults  # noqa: E402
 from fault_plan import ENGINE, FAULTS, HOOKS, Fault, Plan, names, run  # noqa: E402
 from keeper import CUT, HUNG, OPEN, Keeper  # noqa: E402
@@ -60,6 +61,23 @@ class PlanTest(unittest.TestCase):
 
     def test_each_fault_of_the_engine_has_an_action(self):
         self.assertEqual(set(EngineFaults(None, []).actions()), {name for name, kind in FAULTS.items() if kind.needs == ENGINE})
+
+
+class PortTest(unittest.TestCase):
+    def test_a_held_port_is_free_for_its_server_and_for_nobody_else(self):
+        holder = hold_port()
+        self.addCleanup(holder.close)
+        address = holder.getsockname()
+        for _ in range(2):  # a server, and the same one started again
+            with self.assertRaises(OSError), socket.socket() as other:
+                other.bind(address)
+            server = socketserver.TCPServer(address, Echo, bind_and_activate=False)
+            server.allow_reuse_address = True
+            server.server_bind()
+            server.server_activate()
+            with self.assertRaises(OSError), socket.socket() as other:
+                other.bind(address)
+            server.server_close()
 
 
 class Echo(socketserver.BaseRequestHandler):
@@ -138,7 +156,7 @@ class LinkTest(unittest.TestCase):
     def test_a_keeper_that_was_ended_says_so(self):
         keeper = Keeper(life_seconds=0.2)
         self.addCleanup(keeper.close)
-        keeper._process.wait(timeout=WAIT_SECONDS)
+        self.assertTrue(keeper.wait(WAIT_SECONDS))
         with self.assertRaises((RuntimeError, BrokenPipeError)):
             keeper.set([], OPEN)
 

@@ -2,9 +2,10 @@
 
     python3 keeper.py LIFE_SECONDS
 
-The test starts it as a child (class Keeper) and sends it commands as lines of JSON; each is answered by a line. When its
-input ends, because the test ended in whatever way, also by SIGKILL, or when its life is over, it ends the guarded processes
-and removes the guarded folders. So nothing that a test started outlives the test.
+The test starts it (class Keeper) and sends it commands as lines of JSON; each is answered by a line. When its input ends,
+because the test ended in whatever way, also by SIGKILL, or when its life is over, it ends the guarded processes and removes the
+guarded folders. So nothing that a test started outlives the test. It is no descendant of the test, since ctest kills a test that
+takes too long together with all descendants.
 
 States of a link: `open` forwards all bytes; `cut` resets connections, also new ones, as a refusing firewall does; `hung` keeps
 and accepts connections but forwards nothing, as a machine does that is frozen or behind a broken cable. What a hung link
@@ -14,6 +15,7 @@ import asyncio
 import contextlib
 import json
 import os
+import select
 import shutil
 import signal
 import socket
@@ -135,6 +137,7 @@ class Service:
 
     def __init__(self):
         self.links, self.guarded, self.folders = {}, {}, []
+        self.until = 0.0
 
     async def execute(self, command):
         """Runs one command. Returns its answer."""
@@ -152,14 +155,16 @@ class Service:
             self.guarded.pop(command["pid"], None)
         elif what == "folder":
             self.folders.append(command["path"])
+        elif what == "life":
+            self.until = time.monotonic() + command["seconds"]
         return {}
 
     async def run(self, life_seconds):
         reader = asyncio.StreamReader()
         loop = asyncio.get_running_loop()
         await loop.connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), sys.stdin)
-        until = time.monotonic() + life_seconds
-        while (left := until - time.monotonic()) > 0:
+        self.until = time.monotonic() + life_seconds
+        while (left := self.until - time.monotonic()) > 0:
             try:
                 line = await asyncio.wait_for(reader.readline(), left)
             except asyncio.TimeoutError:
@@ -195,6 +200,8 @@ class Keeper:
         self._lock = threading.Lock()
         self._process = subprocess.Popen([sys.executable, "-B", os.path.abspath(__file__), str(life_seconds)], text=True,
                                          stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True)
+        self._process.wait(timeout=ANSWER_SECONDS)  # the child ends once the keeper, its own child, runs
+        self.pid = json.loads(self._process.stdout.readline())["pid"]
 
     def command(self, **command):
         with self._lock:
@@ -224,19 +231,33 @@ class Keeper:
         """Has a folder removed when the test ends."""
         self.command(do="folder", path=path)
 
+    def set_life(self, seconds):
+        """Sets the seconds from now on after which everything guarded is ended."""
+        self.command(do="life", seconds=seconds)
+
+    def wait(self, seconds=ANSWER_SECONDS):
+        """Waits until the keeper has ended: its output ends then. Returns whether it has."""
+        until = time.monotonic() + seconds
+        while (left := until - time.monotonic()) > 0 and any(select.select([self._process.stdout], [], [], left)):
+            if not os.read(self._process.stdout.fileno(), CHUNK):
+                return True
+        return False
+
     def close(self):
         """Ends everything guarded, and the keeper."""
+        if self._process.stdout.closed:
+            return
         with contextlib.suppress(BrokenPipeError):
             self._process.stdin.close()
-        try:
-            self._process.wait(timeout=ANSWER_SECONDS)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+        if not self.wait():
+            os.kill(self.pid, signal.SIGKILL)
         self._process.stdout.close()
 
 
 if __name__ == "__main__":
+    if os.fork():
+        sys.exit(0)
     for ignored in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):  # the test may be ended by one of them: end after it
         signal.signal(ignored, signal.SIG_IGN)
+    print(json.dumps({"pid": os.getpid()}), flush=True)
     asyncio.run(Service().run(float(sys.argv[1])))
