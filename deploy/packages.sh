@@ -19,6 +19,8 @@ sets:
   package    packages that deploy/package.sh and the test of its packages need in addition to build and python
   runtime    libraries that locusd and locus need at run time; the image has nothing else
   edge       the front of deploy/edge
+  cluster    the engine of deploy/cluster in plain processes: PostgreSQL with Patroni, etcd, and the proxy before locusd
+  manifests  Node.js, and from npm the models that check the manifests of deploy/kubernetes
   docs       packages that build the pages of deploy/docs and check their links and spelling
 
   --list    print the names of the packages and do nothing
@@ -58,12 +60,42 @@ runtime_packages="libgrpc++1.51 libprotobuf32 libabsl20220623 libspdlog1.10 liba
   liblua5.4-0 libedit2"
 # The reverse proxy of deploy/edge.
 edge_packages="haproxy"
+# What deploy/cluster runs in containers, and its test in plain processes; python3-psycopg2 writes to PostgreSQL in the test.
+cluster_packages="patroni python3-etcd etcd-server haproxy postgresql-15 python3-psycopg2 python3-yaml"
+# The manifests are read by python3-yaml. Node.js of another source contains npm, with which Debian's npm conflicts.
+manifests_packages="python3-yaml"
+if ! command -v node >/dev/null || ! command -v npm >/dev/null; then manifests_packages="$manifests_packages nodejs npm"; fi
 # Pages are run by python3-yaml and procps besides the packages of the sets build, python and test.
 docs_packages="mkdocs mkdocs-material python3-yaml python3-pymdownx python3-prometheus-client linkchecker codespell
   procps protobuf-compiler"
 
+# The folder in which npm installs the models, whose versions are pinned there, and the list of what is installed.
+models_folder=$(dirname "$0")/../tests/deploy/kubernetes
+models_installed=$models_folder/node_modules/installed-package-lock.json
+
+# Installs the models for the set `manifests`, unless they were installed since their versions were changed last.
+install_models() {
+  [ "$models" = yes ] && [ "$action" = install ] || return 0
+  cmp -s "$models_folder/package-lock.json" "$models_installed" && return 0
+  echo "packages.sh: installing the models of Kubernetes' objects by npm"
+  npm ci --prefix "$models_folder" --ignore-scripts --no-audit --no-fund --loglevel error </dev/null
+  cp "$models_folder/package-lock.json" "$models_installed"
+}
+
+# Prints the services that a package starts when it is installed and at each boot. The tests, compose files and units of
+# locus start these programs themselves.
+services_of() {
+  case $1 in
+    haproxy) echo haproxy.service ;;
+    etcd-server) echo etcd.service ;;
+    patroni) echo patroni.service ;;
+    podman) echo podman.socket podman.service podman-restart.service podman-auto-update.timer podman-auto-update.service ;;
+  esac
+}
+
 action=install
 packages=
+models=no
 for argument in "$@"; do
   case $argument in
     build) packages="$packages $build_packages" ;;
@@ -76,6 +108,8 @@ for argument in "$@"; do
     package) packages="$packages $package_packages" ;;
     runtime) packages="$packages $runtime_packages" ;;
     edge) packages="$packages $edge_packages" ;;
+    cluster) packages="$packages $cluster_packages" ;;
+    manifests) packages="$packages $manifests_packages"; models=yes ;;
     docs) packages="$packages $docs_packages" ;;
     --list) action=list ;;
     --check) action=check ;;
@@ -105,6 +139,7 @@ for package in $packages; do
   esac
 done
 if [ -z "$missing" ]; then
+  install_models
   exit 0
 fi
 if [ "$action" = check ]; then
@@ -122,17 +157,38 @@ else
 fi
 echo "packages.sh: installing$missing"
 $as_root env DEBIAN_FRONTEND=noninteractive apt-get update -q </dev/null
+# Files that keep the packages from starting services during the installation. They are removed again, so that they do not
+# concern packages and databases that the user installs later.
+temporary=
+trap '[ -z "$temporary" ] || $as_root rm -f $temporary' EXIT
+trap 'exit 130' INT TERM HUP
 # Debian's postgresql-15 makes and starts a database at its first installation, unless a file of createcluster.d
-# (pg_createcluster(1)) forbids it. The tests need the programs only. The file is removed again, so that it does not concern
-# databases that the user installs later.
-no_database=
+# (pg_createcluster(1)) forbids it. The tests need the programs only.
 case " $missing " in
   *" postgresql-15 "*)
     no_database=/etc/postgresql-common/createcluster.d/locus-tests.conf
+    temporary=$no_database
     $as_root mkdir -p "${no_database%/*}"
     echo "create_main_cluster = false" | $as_root tee "$no_database" >/dev/null
-    trap '$as_root rm -f "$no_database"' EXIT
-    trap 'exit 130' INT TERM HUP
     ;;
 esac
+# Other packages start a service, unless policy-rc.d forbids it (invoke-rc.d(8)). A policy of the machine stays as it is.
+services=
+for package in $missing; do
+  started=$(services_of "$package")
+  services="$services${started:+ $started}"
+done
+policy=/usr/sbin/policy-rc.d
+if [ -n "$services" ] && ! $as_root test -e "$policy"; then
+  temporary="$temporary $policy"
+  printf '#!/bin/sh\nexit 101\n' | $as_root tee "$policy" >/dev/null
+  $as_root chmod 0755 "$policy"
+fi
 $as_root env DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-install-recommends $missing </dev/null
+# Disable the new services, so that they do not start at the next boot either. `systemctl enable --now` starts them.
+if command -v systemctl >/dev/null; then
+  for service in $services; do
+    $as_root systemctl --quiet disable "$service" >/dev/null 2>&1 || echo "packages.sh: $service was not disabled" >&2
+  done
+fi
+install_models

@@ -152,8 +152,8 @@ say "packages"
 sets=(build python test)
 if [ "$bench" = yes ]; then sets+=(bench); fi
 case "$suites" in *asan*) sets+=(clang) ;; esac
-case "$suites" in *release*) sets+=(package docs) ;; esac
-if [ "$long" = yes ]; then sets+=(lint); fi
+case "$suites" in *release*) sets+=(package docs manifests) ;; esac
+if [ "$long" = yes ]; then sets+=(lint cluster); fi
 ./deploy/packages.sh "${sets[@]}" || { fail "install packages"; finish; }
 
 # In its depend mode, ccache does not preprocess each file before it compiles the file. That saves a tenth of a cold build.
