@@ -48,8 +48,9 @@ bench_packages="libembree-dev libbullet-dev libcgal-dev libnanoflann-dev redis-t
 clang_packages="clang-16 libclang-rt-16-dev"
 lint_packages="clang-tidy mypy"
 # systemd contains systemd-analyze, which checks the unit; iptables and containernetworking-plugins publish ports; catatonit
-# is the first process of a pod.
-container_packages="mmdebstrap buildah podman podman-compose runc iptables containernetworking-plugins systemd catatonit"
+# is the first process of a pod; python3-yaml makes of the manifest what podman can play.
+container_packages="mmdebstrap buildah podman podman-compose runc iptables containernetworking-plugins systemd catatonit
+  python3-yaml"
 # Purposes: debhelper, dh-python and dpkg-dev pack; lintian checks the packages, and diffoscope compares two of them;
 # mmdebstrap makes the root they are installed in; runc runs that root with systemd as its first process; systemd contains
 # systemd-analyze, which checks the unit; binutils lists the libraries of programs for deploy/sbom.py.

@@ -243,13 +243,11 @@ edge_refuses() {
   printf '%s\n' "$output"
   [ "$code" != 0 ] && grep -qi -- "$1" <<< "$output"
 }
-# Plays the manifest with its ports on this machine's loopback, because podman publishes container ports. With `again`, the
-# volume claim is left out: podman refuses to make a volume that exists, where Kubernetes keeps it. Sets `id`.
+# Plays the manifest of one daemon. With `again`, the volume claim is left out. Sets `id`.
 kube_starts() {
   manifest=$work/locusd.yaml
-  sed -e "s/containerPort: 7575/&, hostIP: 127.0.0.1, hostPort: $kube_port/" \
-    -e "s/containerPort: 7576/&, hostIP: 127.0.0.1, hostPort: $kube_http_port/" deploy/kubernetes/locusd.yaml > "$manifest"
-  if [ "${1-}" = again ]; then sed -i '1,/^---$/d' "$manifest"; fi
+  /usr/bin/python3 -B tests/deploy/kubernetes/podman_manifest.py deploy/kubernetes/single/locusd.yaml "$kube_port" "$kube_http_port" \
+    ${1:+--without-claim} > "$manifest" || return
   podman kube play "$manifest" || return
   id=$(podman ps --quiet --filter name=locusd-pod-0-locusd) && [ -n "$id" ] || return
   for _ in $(seq 100); do
@@ -264,7 +262,7 @@ kube_client() { podman run --rm --network host --env LOCUS_ADDRESS=127.0.0.1:"$k
 # Passes if the paths of the manifest's probes answer at the pod's HTTP port.
 kube_probes_pass() {
   local paths path
-  paths=$(sed -n 's/.*httpGet: {path: \([^,]*\), port: 7576}.*/\1/p' deploy/kubernetes/locusd.yaml)
+  paths=$(sed -n 's/.*httpGet: {path: \([^,]*\), port: 7576}.*/\1/p' deploy/kubernetes/single/locusd.yaml)
   [ "$(wc -w <<< "$paths")" = 2 ] || return
   for path in $paths; do http_answers "http://127.0.0.1:$kube_http_port$path" || return; done
 }
@@ -279,7 +277,7 @@ kube_stores_a_scene() { kube_client scene create kept && kube_client insert kept
 kube_ends() {
   [ -n "$manifest" ] || return 0
   podman kube down "$manifest"
-  podman volume rm --force locusd-data && manifest=
+  podman volume rm --force data-locusd-0 && manifest=
 }
 # Verifies a systemd unit after replacing its program by /bin/true, because systemd-analyze requires that the program is
 # installed.

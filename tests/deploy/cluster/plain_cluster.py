@@ -111,10 +111,11 @@ class PlainCluster:
     def start(self, name, command, environment, user=None):
         """Starts a program in a process namespace of its own, as another user if one is given. Returns the process."""
         prefix = ["setpriv", f"--reuid={user.pw_uid}", f"--regid={user.pw_gid}", "--clear-groups", "--"] if user else []
+        variables = {"PATH": f"{self.folder}:/usr/bin:/bin:/usr/sbin:/sbin", "LC_ALL": "C.UTF-8", **environment}
         with open(self.path(name + ".log"), "ab") as log:
-            process = subprocess.Popen(["unshare", "--pid", "--fork", "--mount-proc", "--", *prefix, *command],
-                                       cwd=self.path(name) if user else self.folder, stdin=subprocess.DEVNULL, stdout=log, stderr=log,
-                                       env={"PATH": f"{self.folder}:/usr/bin:/bin:/usr/sbin:/sbin", "LC_ALL": "C.UTF-8", **environment})
+            process = subprocess.Popen(["unshare", "--pid", "--fork", "--mount-proc", "--", *prefix, *command], env=variables,
+                                       cwd=self.path(name) if user else self.folder, stdin=subprocess.DEVNULL, stdout=log,
+                                       stderr=log)
         self.keeper.guard(process.pid)
         return process
 
@@ -140,7 +141,8 @@ class PlainCluster:
             "PATRONI_ETCD3_HOSTS": ",".join(f"127.0.0.1:{member.ports[0]}" for member in self.etcds),
             "PATRONI_POSTGRESQL_LISTEN": f"127.0.0.1:{node.ports[0]}",
             "PATRONI_POSTGRESQL_CONNECT_ADDRESS": f"127.0.0.1:{node.ports[0]}",
-            "PATRONI_POSTGRESQL_DATA_DIR": self.path(node.name, "data"), "PATRONI_POSTGRESQL_PGPASS": self.path(node.name, "pgpass"),
+            "PATRONI_POSTGRESQL_DATA_DIR": self.path(node.name, "data"),
+            "PATRONI_POSTGRESQL_PGPASS": self.path(node.name, "pgpass"),
             "PATRONI_RESTAPI_LISTEN": f"127.0.0.1:{node.ports[1]}",
             "PATRONI_RESTAPI_CONNECT_ADDRESS": f"127.0.0.1:{node.ports[1]}"}, self.user)
 
