@@ -58,9 +58,9 @@ class Leadership {
   // stops at once. Returns false if the scene was not led with this token any more.
   bool fenced(SceneKey scene, Token token);
   // Hands a scene over to a follower that has all of its records or, if the scene has none, to any living member.
-  // `done` receives NOT_FOUND if this daemon does not lead the scene, FAILED_PRECONDITION if `to` is not such a member,
-  // ABORTED if the leader changed meanwhile, and UNAVAILABLE if the engine did not answer recently; after the first,
-  // second and last this daemon leads as before.
+  // `done` receives NOT_FOUND if this daemon does not lead the scene, INVALID_ARGUMENT if `to` is 0,
+  // FAILED_PRECONDITION if `to` is not such a member, ABORTED if the leader changed meanwhile, and UNAVAILABLE if the
+  // engine did not answer recently; after the first, second and last this daemon leads as before.
   void move(SceneKey scene, MemberId to, MoveDone done) LOCUS_EXCLUDES(mutex_);
   // Begins to hand over all scenes, each to a follower that has all of its records or else to the less loaded of two
   // members, then to leave the cluster.
@@ -78,8 +78,9 @@ class Leadership {
  private:
   struct Move {
     SceneKey scene = 0;
-    MemberId to = 0;  // 0: the daemon drains, and any member will do
-    MoveDone done;    // may be empty
+    MemberId to = 0;
+    MoveDone done;        // may be empty
+    bool drains = false;  // the daemon drains: any member will do, and `to` is 0
   };
   struct HandOver {
     Move move;

@@ -10,7 +10,7 @@ namespace locus::server {
 void Leadership::move(SceneKey scene, MemberId to, MoveDone done) {
   {
     const MutexLock lock(mutex_);
-    moves_.push_back({scene, to, std::move(done)});
+    moves_.push_back({scene, to, std::move(done), false});
   }
   options_.wake();
 }
@@ -38,7 +38,7 @@ std::optional<Leadership::Move> Leadership::next_move() {
   const std::vector<SceneKey> led = led_.keys();
   const MutexLock lock(mutex_);
   if (moves_.empty() && draining_)
-    for (const SceneKey scene : led) moves_.push_back({scene, 0, nullptr});
+    for (const SceneKey scene : led) moves_.push_back({scene, 0, nullptr, true});
   if (moves_.empty()) return std::nullopt;
   return moves_.front();
 }
@@ -66,7 +66,7 @@ void Leadership::refuse_moves() {
 }
 
 MemberId Leadership::target_of(const Move& move, absl::Span<const MemberId> followers) {
-  if (move.to != 0) return move.to;
+  if (!move.drains) return move.to;
   const MutexLock lock(mutex_);
   table_.remove(self_.id);
   if (const std::optional<MemberId> follower = table_.choose_of(followers)) return *follower;
@@ -76,7 +76,11 @@ MemberId Leadership::target_of(const Move& move, absl::Span<const MemberId> foll
 bool Leadership::begin_hand_over() {
   const std::optional<Move> move = next_move();
   if (!move) return false;
-  const bool drains = move->to == 0;
+  const bool drains = move->drains;
+  if (!drains && move->to == 0) {
+    finish_move(*move, absl::InvalidArgumentError("a scene is moved to a member, and 0 is none"));
+    return true;
+  }
   if (led_.find(move->scene) == nullptr) {
     finish_move(*move, absl::NotFoundError("this daemon does not lead the scene"));
     return true;
@@ -117,7 +121,7 @@ bool Leadership::hand_over() {
     case absl::StatusCode::kNotFound:
       break;
     case absl::StatusCode::kFailedPrecondition:
-      if (current.move.to == 0) {
+      if (current.move.drains) {
         const MutexLock lock(mutex_);
         table_.remove(current.to);
         hand_over_->to = table_.choose(options_.random, self_.id, 0).value_or(0);

@@ -246,6 +246,14 @@ TEST_F(LeadershipTest, ASceneWithoutFollowersMovesToAnyLivingMember) {
   EXPECT_EQ(cluster_.unled({1}), "");
 }
 
+TEST_F(LeadershipTest, AMoveToNoMemberIsRefusedAndChangesNothing) {
+  create_at(*daemons_[0], 1);
+  follow(*daemons_[1], 1);
+  EXPECT_EQ(move(*daemons_[0], 1, 0)->code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(leader(1), daemons_[0]);
+  EXPECT_THAT(daemons_[0]->stops, IsEmpty());
+}
+
 TEST_F(LeadershipTest, AMoveWhileTheEngineIsAwayIsRefusedAndChangesNothing) {
   create_at(*daemons_[0], 1);
   follow(*daemons_[1], 1);
