@@ -42,15 +42,15 @@ void Leadership::adopt_member() {
   self_ = std::move(self);
 }
 
-void Leadership::deliver_stops() {
-  for (const LedScenes::Stopped& stopped : led_.take_stopped())
-    host_.stop_leading(stopped.scene, stopped.token, stopped.reason);
+void Leadership::deliver(const std::vector<LedScenes::Stopped>& stops) {
+  for (const LedScenes::Stopped& stopped : stops) host_.stop_leading(stopped.scene, stopped.token, stopped.reason);
 }
 
 void Leadership::begin(const LeaderRow& row) {
-  std::shared_ptr<const SceneLease> lease = led_.start(row, self_.lease);
-  deliver_stops();
-  if (lease != nullptr) host_.start_leading({row, std::move(lease)});
+  LedScenes::Started started = led_.start(row, self_.lease);
+  if (started.lease == nullptr) return;
+  deliver(started.before);
+  host_.start_leading({row, std::move(started.lease)});
 }
 
 bool Leadership::postpone() {

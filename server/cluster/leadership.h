@@ -107,7 +107,8 @@ class Leadership {
   // Stops leading if this daemon's member was declared dead.
   void adopt_member();
   // Notifies the host of stops.
-  void deliver_stops();
+  void deliver(const std::vector<LedScenes::Stopped>& stops);
+  void deliver_stops() { deliver(led_.take_stopped()); }
   // Begins to lead the scene unless it is led with this token.
   void begin(const LeaderRow& row);
   // Postpones the next call of the engine after an error. Returns true.

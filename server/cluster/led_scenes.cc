@@ -6,16 +6,16 @@
 
 namespace locus::server {
 
-std::shared_ptr<const SceneLease> LedScenes::start(const LeaderRow& row, std::shared_ptr<const MemberLease> member) {
+LedScenes::Started LedScenes::start(const LeaderRow& row, std::shared_ptr<const MemberLease> member) {
   const MutexLock lock(mutex_);
   std::shared_ptr<SceneLease>& lease = scenes_[row.key];
   if (lease != nullptr) {
-    if (lease->token() >= row.token) return nullptr;
+    if (lease->token() >= row.token) return {};
     lease->stop();
     stopped_.push_back({row.key, lease->token(), StopReason::kFenced});
   }
   lease = std::make_shared<SceneLease>(row.key, row.token, std::move(member));
-  return lease;
+  return {lease, std::exchange(stopped_, {})};
 }
 
 bool LedScenes::stop(SceneKey scene, Token token, StopReason reason) {

@@ -23,10 +23,14 @@ class LedScenes {
     StopReason reason = StopReason::kFenced;
   };
 
-  // Adds a scene. Returns its lease, or null if the scene is in the table with this or a higher token. A lower token is
-  // stopped as fenced.
-  std::shared_ptr<const SceneLease> start(const LeaderRow& row, std::shared_ptr<const MemberLease> member)
-      LOCUS_EXCLUDES(mutex_);
+  struct Started {
+    std::shared_ptr<const SceneLease> lease;  // null: the scene is in the table already, with this or a higher token
+    std::vector<Stopped> before;              // stops that the host is to be notified of before it starts
+  };
+
+  // Adds a scene. A lower token is stopped as fenced. The stops up to this moment are returned with the lease, because
+  // a stop of the new lease may follow at any time and must reach the host after the start.
+  Started start(const LeaderRow& row, std::shared_ptr<const MemberLease> member) LOCUS_EXCLUDES(mutex_);
   // Stops the lease of a scene at once and removes the scene. Returns false, and does nothing, if its token is not
   // `token`.
   bool stop(SceneKey scene, Token token, StopReason reason) LOCUS_EXCLUDES(mutex_);

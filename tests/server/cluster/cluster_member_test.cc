@@ -177,6 +177,29 @@ TEST_F(ClusterMemberTest, AMoveIsRefusedInWordsIfTheSceneIsNotLedHere) {
   EXPECT_THAT(std::string(moved.message()), ::testing::HasSubstr("this daemon"));
 }
 
+// A host may fence a scene again at once, with the token that the engine still has.
+TEST_F(ClusterMemberTest, StartsAndStopsOfASceneAlternateWhileItIsFencedAllTheTime) {
+  engine_.add_scene(1);
+  ASSERT_TRUE(soon([&] { return !leaders(1).empty(); }));
+  ThreadedDaemon& daemon = *leaders(1).front();
+  const Token token = engine_.row(1).token;
+  std::atomic<bool> done = false;
+  std::atomic<uint64_t> fenced = 0;
+  std::vector<std::thread> threads;
+  for (int number = 0; number < 2; ++number)
+    threads.emplace_back([&] {
+      while (!done) {
+        fenced += daemon.member->fenced(1, token) ? 1 : 0;
+        daemon.member->look_soon();
+      }
+    });
+  std::this_thread::sleep_for(seconds(1));
+  done = true;
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_GT(fenced, 20u);
+  EXPECT_EQ(daemon.host.wrong(), 0u);
+}
+
 // Threads that search for scenes with two leaders, until the object is destroyed.
 class LeaderWatch {
  public:

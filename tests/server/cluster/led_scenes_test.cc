@@ -20,7 +20,7 @@ class LedScenesTest : public ::testing::Test {
 };
 
 TEST_F(LedScenesTest, AStoppedSceneIsRemovedAndItsLeaseStopsAtOnce) {
-  const auto lease = led_.start(led_row(5, 3), member_);
+  const auto lease = led_.start(led_row(5, 3), member_).lease;
   EXPECT_EQ(led_.find(5), lease);
   EXPECT_FALSE(led_.stop(5, 2, StopReason::kFenced)) << "another token";
   EXPECT_TRUE(led_.stop(5, 3, StopReason::kFenced));
@@ -33,16 +33,28 @@ TEST_F(LedScenesTest, AStoppedSceneIsRemovedAndItsLeaseStopsAtOnce) {
 }
 
 TEST_F(LedScenesTest, OnlyAHigherTokenReplacesALease) {
-  const auto lease = led_.start(led_row(5, 3), member_);
-  EXPECT_EQ(led_.start(led_row(5, 3), member_), nullptr);
-  EXPECT_EQ(led_.start(led_row(5, 2), member_), nullptr);
-  EXPECT_NE(led_.start(led_row(5, 4), member_), nullptr);
+  const auto lease = led_.start(led_row(5, 3), member_).lease;
+  EXPECT_EQ(led_.start(led_row(5, 3), member_).lease, nullptr);
+  EXPECT_EQ(led_.start(led_row(5, 2), member_).lease, nullptr);
+  const LedScenes::Started started = led_.start(led_row(5, 4), member_);
+  EXPECT_NE(started.lease, nullptr);
   EXPECT_EQ(lease->state(), SceneLease::State::kStopped);
+  EXPECT_THAT(started.before, SizeIs(1));
+  EXPECT_THAT(led_.take_stopped(), IsEmpty());
+}
+
+// Another thread may stop the scene before the host is told that it started.
+TEST_F(LedScenesTest, AStopOfTheNewLeaseIsNotAmongTheStopsBeforeItsStart) {
+  led_.start(led_row(5, 3), member_);
+  EXPECT_TRUE(led_.stop(5, 3, StopReason::kFenced));
+  const LedScenes::Started again = led_.start(led_row(5, 3), member_);
+  EXPECT_TRUE(led_.stop(5, 3, StopReason::kFenced));
+  EXPECT_THAT(again.before, SizeIs(1));
   EXPECT_THAT(led_.take_stopped(), SizeIs(1));
 }
 
 TEST_F(LedScenesTest, ATakenSceneHasNoStopForTheHost) {
-  const auto lease = led_.start(led_row(5, 3), member_);
+  const auto lease = led_.start(led_row(5, 3), member_).lease;
   EXPECT_EQ(led_.take(5), 3u);
   EXPECT_EQ(led_.take(5), std::nullopt);
   EXPECT_EQ(lease->state(), SceneLease::State::kStopped);
