@@ -51,6 +51,7 @@ void ClusterMember::start() {
 void ClusterMember::stop() {
   beats_.stop();
   scenes_.stop();
+  leadership_.end();
 }
 
 ClusterMember::Time ClusterMember::keeper_time(ClusterTime time) const {

@@ -42,7 +42,7 @@ class ClusterMember {
   // Starts both threads, which join the cluster and beat.
   void start();
   // Ends both threads, after a call of the engine that is running. The scenes stay this member's until others declare
-  // it dead: call drain() before.
+  // it dead: call drain() before. Moves that wait end as CANCELLED, or as UNAVAILABLE if the engine did not answer.
   void stop();
 
   // Chooses the leader of a new scene, waiting for the engine: see Leadership::place().

@@ -26,7 +26,7 @@ ClusterTime Leadership::step() {
   }
   if (mark_suspect() || hand_over() || reconcile() || end_drain() || take_followed() || give_estate() || sweep())
     return options_.clock();
-  return std::max(now, std::min(soon, membership_.next_occasion()));
+  return std::max(now, std::min(soon, membership_.next_occasion(now)));
 }
 
 void Leadership::adopt_member() {
@@ -49,6 +49,7 @@ void Leadership::deliver(const std::vector<LedScenes::Stopped>& stops) {
 void Leadership::begin(const LeaderRow& row) {
   LedScenes::Started started = led_.start(row, self_.lease);
   if (started.lease == nullptr) return;
+  found_nothing_ = false;
   deliver(started.before);
   host_.start_leading({row, std::move(started.lease)});
 }
@@ -83,6 +84,7 @@ bool Leadership::reconcile() {
     if (lease != nullptr && !present.contains(scene)) led_.stop(scene, lease->token(), StopReason::kFenced);
   }
   deliver_stops();
+  found_nothing_ = rows->empty();
   return true;
 }
 

@@ -34,7 +34,7 @@ namespace locus::server {
 
 class Leadership {
  public:
-  // Function that receives the result of a move; called on the thread of step().
+  // Function that receives the result of a move; called on the thread of step(), or of end().
   using MoveDone = std::function<void(const absl::Status&)>;
 
   struct Options {
@@ -62,6 +62,9 @@ class Leadership {
   // FAILED_PRECONDITION if `to` is not such a member, ABORTED if the leader changed meanwhile, and UNAVAILABLE if the
   // engine did not answer recently; after the first, second and last this daemon leads as before.
   void move(SceneKey scene, MemberId to, MoveDone done) LOCUS_EXCLUDES(mutex_);
+  // Ends after the last step(): the moves that wait, and later ones, receive CANCELLED. A move whose outcome was not
+  // known yet receives UNAVAILABLE.
+  void end() LOCUS_EXCLUDES(mutex_);
   // Begins to hand over all scenes, each to a follower that has all of its records or else to the less loaded of two
   // members, then to leave the cluster.
   void drain() LOCUS_EXCLUDES(mutex_);
@@ -144,13 +147,14 @@ class Leadership {
   std::deque<ClusterHost::FollowedScene> followed_;  // scenes of dead leaders that this member takes over
   std::optional<HandOver> hand_over_;
   std::optional<Estate> estate_;
-  bool drain_reconciled_ = false;
-  MemberId leaving_ = 0;  // member that has ended its lease and is to leave
+  bool found_nothing_ = false;  // the last comparison found that this member leads nothing, and nothing began since
+  MemberId leaving_ = 0;        // member that has ended its lease and is to leave
 
   mutable Mutex mutex_;
   PlacementTable table_ LOCUS_GUARDED_BY(mutex_);
   std::deque<Move> moves_ LOCUS_GUARDED_BY(mutex_);
   bool reconcile_soon_ LOCUS_GUARDED_BY(mutex_) = false;
+  bool ended_ LOCUS_GUARDED_BY(mutex_) = false;
   bool draining_ LOCUS_GUARDED_BY(mutex_) = false;
   bool drained_ LOCUS_GUARDED_BY(mutex_) = false;
 };

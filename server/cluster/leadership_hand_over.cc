@@ -6,13 +6,33 @@
 #include "server/cluster/leadership.h"
 
 namespace locus::server {
+namespace {
+
+absl::Status stopped() { return absl::CancelledError("this daemon stops"); }
+
+}  // namespace
 
 void Leadership::move(SceneKey scene, MemberId to, MoveDone done) {
   {
     const MutexLock lock(mutex_);
-    moves_.push_back({scene, to, std::move(done), false});
+    if (!ended_) moves_.push_back({scene, to, std::exchange(done, nullptr), false});
   }
+  if (done) done(stopped());
   options_.wake();
+}
+
+void Leadership::end() {
+  std::deque<Move> left;
+  {
+    const MutexLock lock(mutex_);
+    ended_ = true;
+    left.swap(moves_);
+  }
+  for (const Move& move : left) {
+    const bool running = hand_over_ && &move == &left.front();
+    if (move.done)
+      move.done(running ? absl::UnavailableError("the scene may have been moved: this daemon stops") : stopped());
+  }
 }
 
 void Leadership::drain() {
@@ -142,7 +162,7 @@ bool Leadership::end_drain() {
   if (leaving_ == 0 && !self_.left) {
     if (self_.id == 0 && !hand_over_) return false;  // has not joined yet, or joins
     if (hand_over_ || led_.size() != 0) return false;
-    if (!std::exchange(drain_reconciled_, true)) {  // scenes may have been given to this member meanwhile
+    if (!found_nothing_) {  // scenes may have been given to this member meanwhile
       reconcile_soon();
       return true;
     }

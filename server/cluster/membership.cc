@@ -162,11 +162,11 @@ void Membership::forgotten(MemberId id) {
   ring_.remove_dead(id);
 }
 
-ClusterTime Membership::next_occasion() const {
+ClusterTime Membership::next_occasion(ClusterTime now) const {
   const MutexLock lock(mutex_);
   const ClusterTime noticed = ring_.first_noticed(id_);
   const ClusterTime duty = noticed == ClusterTime::max() ? noticed : noticed + options_.timing.others_wait;
-  return std::min(silence_.next(), duty);
+  return std::min(silence_.next(now), duty);
 }
 
 }  // namespace locus::server

@@ -75,7 +75,7 @@ class Membership {
   // Records that a dead member was forgotten.
   void forgotten(MemberId id) LOCUS_EXCLUDES(mutex_);
   // Returns the first time at which suspect() or responsibility() may return a member unless a beat changes that.
-  ClusterTime next_occasion() const LOCUS_EXCLUDES(mutex_);
+  ClusterTime next_occasion(ClusterTime now) const LOCUS_EXCLUDES(mutex_);
 
  private:
   enum class State : uint8_t { kJoining, kMember, kLeft };

@@ -8,8 +8,7 @@
 namespace locus::server {
 
 void SilenceCounter::beat_succeeded(ClusterTime received, absl::Span<const SeenBeat> seen) {
-  const bool gap = !last_success_ || received - *last_success_ > timing_.max_gap;
-  if (gap && !planted(PlantedBug::kSilenceWithoutBeats)) watched_.clear();
+  if (stale(received) && !planted(PlantedBug::kSilenceWithoutBeats)) watched_.clear();
   last_success_ = received;
   absl::flat_hash_map<MemberId, Watched> now_watched;
   for (const SeenBeat& member : seen) {
@@ -35,14 +34,14 @@ void SilenceCounter::clear() {
 }
 
 std::optional<SeenBeat> SilenceCounter::silent(ClusterTime now) const {
-  const bool stale = !last_success_ || now - *last_success_ > timing_.max_gap;
-  if (stale && !planted(PlantedBug::kSilenceWithoutBeats)) return std::nullopt;
+  if (stale(now) && !planted(PlantedBug::kSilenceWithoutBeats)) return std::nullopt;
   for (const auto& [id, watched] : watched_)
     if (now - watched.since >= timing_.silence) return SeenBeat{id, watched.beat};
   return std::nullopt;
 }
 
-ClusterTime SilenceCounter::next() const {
+ClusterTime SilenceCounter::next(ClusterTime now) const {
+  if (stale(now)) return ClusterTime::max();
   ClusterTime first = ClusterTime::max();
   for (const auto& [id, watched] : watched_) first = std::min(first, watched.since + timing_.silence);
   return first;

@@ -32,8 +32,9 @@ class SilenceCounter {
 
   // Returns a member that has been silent for `timing.silence`, with its beat, or nullopt.
   std::optional<SeenBeat> silent(ClusterTime now) const;
-  // Returns the first time at which silent() may return a member if no further beat is seen.
-  ClusterTime next() const;
+  // Returns the first time at which silent() may return a member if no further beat is seen, or ClusterTime::max() if
+  // only a further beat can make it do so.
+  ClusterTime next(ClusterTime now) const;
   // Returns the number of members that have been silent for `timing.quiet`.
   size_t quiet(ClusterTime now) const;
 
@@ -42,6 +43,9 @@ class SilenceCounter {
     uint64_t beat = 0;
     ClusterTime since;  // time at which this beat was first seen
   };
+
+  // Returns true if the last own beat is too long ago for silence of others to count.
+  bool stale(ClusterTime now) const { return !last_success_ || now - *last_success_ > timing_.max_gap; }
 
   const ClusterTiming timing_;
   absl::flat_hash_map<MemberId, Watched> watched_;

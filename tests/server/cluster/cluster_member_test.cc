@@ -83,13 +83,21 @@ class ThreadedHost : public ClusterHost {
 struct ThreadedDaemon {
   ThreadedDaemon(SimulatedEngine& engine, uint64_t seed)
       : link(
-            engine, [this](CallKind) { return away ? CallFate::kNever : CallFate::kAnswered; },
+            engine,
+            [this](CallKind kind) {
+              ++hanging;
+              while (hangs && kind != CallKind::kBeat) std::this_thread::sleep_for(milliseconds(1));
+              --hanging;
+              return away ? CallFate::kNever : CallFate::kAnswered;
+            },
             [](const std::function<void()>&) {}, [](CallKind, CallFate) {}),
         member(std::make_unique<ClusterMember>(
             link, host, ClusterMember::Options{{"host", "", ""}, fast_timing(), &steady_now, seed})) {
     member->start();
   }
-  std::atomic<bool> away{false};  // cut off from the engine
+  std::atomic<bool> away{false};     // cut off from the engine
+  std::atomic<bool> hangs{false};    // calls but beats wait until this is false again
+  std::atomic<uint64_t> hanging{0};  // calls that wait
   test::EngineLink link;
   ThreadedHost host;
   std::unique_ptr<ClusterMember> member;
@@ -175,6 +183,26 @@ TEST_F(ClusterMemberTest, AMoveIsRefusedInWordsIfTheSceneIsNotLedHere) {
   const absl::Status moved = daemons_[0]->member->move(77, 5, std::chrono::steady_clock::now() + seconds(60));
   EXPECT_EQ(moved.code(), absl::StatusCode::kNotFound);
   EXPECT_THAT(std::string(moved.message()), ::testing::HasSubstr("this daemon"));
+}
+
+TEST_F(ClusterMemberTest, MovesThatWaitEndWhenTheDaemonStops) {
+  engine_.add_scene(1);
+  ASSERT_TRUE(soon([&] { return !leaders(1).empty(); }));
+  ThreadedDaemon& daemon = *leaders(1).front();
+  daemon.hangs = true;
+  ASSERT_TRUE(soon([&] { return daemon.hanging > 0; }));
+  const auto deadline = std::chrono::steady_clock::now() + seconds(60);
+  absl::StatusCode code = absl::StatusCode::kOk;
+  std::thread mover([&] { code = daemon.member->move(1, 5, deadline).code(); });
+  std::this_thread::sleep_for(milliseconds(50));
+  std::thread stopper([&] { daemon.member->stop(); });
+  std::this_thread::sleep_for(milliseconds(300));  // until it waits for the call that hangs
+  daemon.hangs = false;
+  stopper.join();
+  mover.join();
+  EXPECT_EQ(code, absl::StatusCode::kCancelled);
+  EXPECT_EQ(daemon.member->move(1, 5, deadline).code(), absl::StatusCode::kCancelled) << "it has stopped";
+  EXPECT_LT(std::chrono::steady_clock::now(), deadline);
 }
 
 // A host may fence a scene again at once, with the token that the engine still has.

@@ -219,6 +219,29 @@ TEST_F(LeadershipTest, ADrainHandsScenesToFollowersAndLeaves) {
   EXPECT_EQ(daemons_[0]->id(), 0u) << "it does not join again";
 }
 
+// Others give scenes to a member that drains until they have seen its beat.
+TEST_F(LeadershipTest, ADrainNoticesAllScenesThatWereGivenMeanwhile) {
+  create_at(*daemons_[0], 1);
+  const MemberId id = daemons_[0]->id();
+  for (const SceneKey key : {2, 3}) {
+    cluster_.engine().add_scene(key);
+    keys_.push_back(key);
+  }
+  daemons_[0]->followers_of = [&](SceneKey key) {  // called before each hand-over
+    if (key < 3 && cluster_.engine().row(key + 1).token == 0) {
+      EXPECT_TRUE(cluster_.engine().take_over(key + 1, 0, id).ok());
+    }
+    return std::vector<MemberId>();
+  };
+  cluster_.drain(*daemons_[0]);
+  for (int i = 0; i < 500 && !daemons_[0]->leadership().drained(); ++i) cluster_.run(milliseconds(10));
+  EXPECT_TRUE(daemons_[0]->leadership().drained());
+  EXPECT_THAT(cluster_.engine().scenes_led_by(id).value(), IsEmpty());
+  EXPECT_THAT(daemons_[0]->stops, SizeIs(3));
+  cluster_.run(seconds(2));
+  EXPECT_EQ(cluster_.unled(keys_), "");
+}
+
 TEST_F(LeadershipTest, TheLastMemberReleasesItsScenesAndTheNextOneLeadsThem) {
   create(1);
   for (Daemon* daemon : daemons_) cluster_.drain(*daemon);

@@ -30,7 +30,7 @@ TEST_F(SilenceCounterTest, AMemberWithTheSameBeatForSixSecondsIsSilent) {
   ASSERT_TRUE(silent_at(6000));
   EXPECT_EQ(silence_.silent(at(6000))->id, kPeer);
   EXPECT_EQ(silence_.silent(at(6000))->beat, 5u);
-  EXPECT_EQ(silence_.next(), at(6000));
+  EXPECT_EQ(silence_.next(at(6000)), at(6000));
 }
 
 TEST_F(SilenceCounterTest, AMemberThatBeatsIsNeverSilent) {
@@ -61,6 +61,13 @@ TEST_F(SilenceCounterTest, NobodyIsSilentWhileTheLastOwnBeatIsLongAgo) {
   EXPECT_FALSE(silent_at(7501));
 }
 
+// The caller would ask again and again while a beat hangs.
+TEST_F(SilenceCounterTest, OnlyAFurtherBeatCanMakeAMemberSilentWhileTheLastOneIsLongAgo) {
+  see(0, 6000, 5);
+  EXPECT_EQ(silence_.next(at(8500)), at(6000));
+  EXPECT_EQ(silence_.next(at(8501)), ClusterTime::max());
+}
+
 TEST_F(SilenceCounterTest, AMemberThatTurnedOutToBeLivingIsCountedAnew) {
   see(0, 6000, 5);
   silence_.restart(kPeer, at(6000));
@@ -73,7 +80,7 @@ TEST_F(SilenceCounterTest, AMemberThatIsNotWatchedAnyMoreIsForgotten) {
   see(0, 6000, 5);
   silence_.beat_succeeded(at(6500), {});
   EXPECT_FALSE(silent_at(6500));
-  EXPECT_EQ(silence_.next(), ClusterTime::max());
+  EXPECT_EQ(silence_.next(at(6500)), ClusterTime::max());
 }
 
 TEST_F(SilenceCounterTest, QuietMembersAreCounted) {
