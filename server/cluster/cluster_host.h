@@ -46,7 +46,8 @@ class ClusterHost {
   // allows: it may have ended already.
   virtual void start_leading(const LedScene& scene) = 0;
   // Ends leading: when this returns, no further append with `token` begins. The scene's lease has been stopped before,
-  // perhaps by another thread and longer ago. Nothing was published that was not committed, so nothing is undone.
+  // perhaps by another thread and longer ago. The token is that of the start, or the one to which token_raised() raised
+  // it. Nothing was published that was not committed, so nothing is undone.
   virtual void stop_leading(SceneKey scene, Token token, StopReason reason) = 0;
   // Notifies that this member made another one, or none if `row.leader` is 0, the leader: the daemon may tell it, or
   // its followers, before they notice by themselves within a second.

@@ -49,6 +49,8 @@ class ClusterMember {
   absl::StatusOr<LeaderRow> place(SceneKey scene) { return leadership_.place(scene); }
   // Stops leading a scene whose append was fenced, or that was deleted: see Leadership::fenced().
   bool fenced(SceneKey scene, Token token) { return leadership_.fenced(scene, token); }
+  // Leads a scene on with another token, see Leadership::token_raised(): call it when PostgresLog reports the token.
+  bool token_raised(SceneKey scene, Token before, Token now) { return leadership_.token_raised(scene, before, now); }
   // Hands a scene over to a follower that has all of its records, and waits for the result: see Leadership::move().
   // Returns DEADLINE_EXCEEDED if the result was not known at `deadline`; the move may still happen then.
   absl::Status move(SceneKey scene, MemberId to, std::chrono::steady_clock::time_point deadline);

@@ -57,6 +57,10 @@ class Leadership {
   // Records that an append with `token` was refused because of the fence, or that the scene was deleted: its lease
   // stops at once. Returns false if the scene was not led with this token any more.
   bool fenced(SceneKey scene, Token token);
+  // Records that this daemon itself made the token of a scene that it leads higher, to fence a lost append: its lease
+  // continues. Returns false if the scene was not led with `before` any more; a comparison with the engine's rows may
+  // have noticed the new token first, and then the scene was stopped and begun again.
+  bool token_raised(SceneKey scene, Token before, Token now) { return led_.raise(scene, before, now); }
   // Hands a scene over to a follower that has all of its records or, if the scene has none, to any living member.
   // `done` receives NOT_FOUND if this daemon does not lead the scene, INVALID_ARGUMENT if `to` is 0,
   // FAILED_PRECONDITION if `to` is not such a member, ABORTED if the leader changed meanwhile, and UNAVAILABLE if the

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "core/base/check.h"
 #include "core/base/planted_bug.h"
 
 namespace locus::server {
@@ -35,6 +36,15 @@ void LedScenes::stop_all(StopReason reason) {
     stopped_.push_back({scene, lease->token(), reason});
   }
   scenes_.clear();
+}
+
+bool LedScenes::raise(SceneKey scene, Token before, Token now) {
+  const MutexLock lock(mutex_);
+  const auto found = scenes_.find(scene);
+  if (found == scenes_.end() || found->second->token() != before) return false;
+  LOCUS_CHECK_LT(before, now);
+  found->second->raise(now);
+  return true;
 }
 
 std::optional<Token> LedScenes::take(SceneKey scene) {

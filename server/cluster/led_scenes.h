@@ -35,6 +35,8 @@ class LedScenes {
   // `token`.
   bool stop(SceneKey scene, Token token, StopReason reason) LOCUS_EXCLUDES(mutex_);
   void stop_all(StopReason reason) LOCUS_EXCLUDES(mutex_);
+  // Makes the token of a scene `now`, if it is `before`. Returns false, and does nothing, if it is another one.
+  bool raise(SceneKey scene, Token before, Token now) LOCUS_EXCLUDES(mutex_);
   // Stops the lease of a scene and removes the scene; the caller notifies the host. Returns its token, or nullopt.
   std::optional<Token> take(SceneKey scene) LOCUS_EXCLUDES(mutex_);
   // Returns the stops since the last call, in order.

@@ -47,7 +47,8 @@ class MemberLease {
   std::atomic<bool> ended_{false};
 };
 
-// Right to lead one scene with one token.
+// Right to lead one scene with one token, which only a raise changes: the leader itself made it higher, to fence a lost
+// append of its own.
 class SceneLease {
  public:
   enum class State : uint8_t {
@@ -62,7 +63,7 @@ class SceneLease {
   }
 
   SceneKey scene() const { return scene_; }
-  Token token() const { return token_; }
+  Token token() const { return token_.load(std::memory_order_acquire); }
   const MemberLease& member() const { return *member_; }
 
   State state() const {
@@ -71,10 +72,11 @@ class SceneLease {
   }
   bool living() const { return state() == State::kLiving; }
   void stop() { stopped_.store(true, std::memory_order_release); }
+  void raise(Token token) { token_.store(token, std::memory_order_release); }
 
  private:
   const SceneKey scene_;
-  const Token token_;
+  std::atomic<Token> token_;
   const std::shared_ptr<const MemberLease> member_;
   std::atomic<bool> stopped_{false};
 };

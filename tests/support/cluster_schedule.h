@@ -94,7 +94,7 @@ class ClusterSchedule {
     if (daemons.empty()) return start();
     Daemon& daemon = *random_.pick(daemons);
     const auto time = std::chrono::milliseconds(random_.below(20000));
-    switch (random_.below(12)) {
+    switch (random_.below(14)) {
       case 0:
       case 1:
         return cluster_.pause(daemon, time);
@@ -117,6 +117,12 @@ class ClusterSchedule {
         return cluster_.move(daemon, scene, random_.pick(daemons)->id());
       }
       case 11:
+      case 12: {
+        const SceneKey scene = random_.pick(scenes_);
+        (void)cluster_.raise_token(daemon, scene, std::chrono::milliseconds(random_.below(500)));
+        return;
+      }
+      case 13:
         add_scene();
         if (random_.chance(0.5)) (void)daemon.leadership().place(scenes_.back());
         return;

@@ -27,12 +27,12 @@ class LeadershipClaims {
 
   // Records that the daemon began to lead at the present time.
   void begin(uint64_t daemon, const Lease& lease) {
-    open_[daemon].push_back({daemon, lease->scene(), lease->token(), clock_, allowed_until(*lease), lease});
+    open_[daemon].push_back({daemon, lease->scene(), 0, clock_, allowed_until(*lease), lease});
   }
   // Records that the daemon stopped leading at the present time.
   void end(uint64_t daemon, SceneKey scene, server::Token token) {
     for (Claim& claim : open_[daemon])
-      if (claim.scene == scene && claim.token == token) claim.until = std::min(claim.until, clock_);
+      if (claim.scene == scene && claim.lease->token() == token) claim.until = std::min(claim.until, clock_);
   }
   // Records that the daemon ended, with all of its claims.
   void end_all(uint64_t daemon) {
@@ -94,7 +94,7 @@ class LeadershipClaims {
   struct Claim {
     uint64_t daemon = 0;
     SceneKey scene = 0;
-    server::Token token = 0;
+    server::Token token = 0;  // when the claim was closed
     Time from, until;
     Lease lease;
   };
@@ -108,6 +108,7 @@ class LeadershipClaims {
     return lease.state() == server::SceneLease::State::kStopped ? now : end;
   }
   void close(Claim claim) {
+    claim.token = claim.lease->token();  // it may have been raised
     if (claim.from < claim.until) closed_[claim.scene].push_back(std::move(claim));
   }
 

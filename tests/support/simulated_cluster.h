@@ -152,6 +152,19 @@ class SimulatedCluster {
     daemon.may_hand_over_ = true;
     daemon.leadership_->drain();
   }
+  // Lets a daemon make the token of a scene that it leads higher, as PostgresLog does; its leadership learns that after
+  // `delay`. Returns false if another one leads the scene.
+  bool raise_token(Daemon& daemon, SceneKey scene, Duration delay) {
+    const auto lease = daemon.leadership_->find(scene);
+    if (lease == nullptr) return false;
+    const server::Token token = lease->token();
+    if (!engine_.raise_token(scene, daemon.id(), token)) return false;
+    execute_later(delay, [this, number = daemon.number_, scene, token] {
+      const auto found = daemons_.find(number);
+      if (found != daemons_.end()) found->second->leadership_->token_raised(scene, token, token + 1);
+    });
+    return true;
+  }
   // Asks a daemon to move a scene.
   void move(Daemon& daemon, SceneKey scene, server::MemberId to, server::Leadership::MoveDone done = nullptr) {
     daemon.may_hand_over_ = true;
@@ -206,6 +219,11 @@ class SimulatedCluster {
   void unschedule(Daemon& daemon) {
     queue_.erase({daemon.beats_.at, {Role::kBeats, daemon.number_}});
     queue_.erase({daemon.scenes_.at, {Role::kScenes, daemon.number_}});
+  }
+  void execute_later(Duration delay, std::function<void()> statement) {
+    const uint64_t key = ++last_statement_;
+    statements_[key] = std::move(statement);
+    queue_.insert({local_ + delay, {Role::kStatement, key}});
   }
   void wake_scenes(Daemon& daemon) {
     queue_.erase({daemon.scenes_.at, {Role::kScenes, daemon.number_}});
@@ -292,10 +310,7 @@ inline SimulatedCluster::Daemon::Daemon(SimulatedCluster& cluster, uint64_t numb
       link_(
           cluster.engine_, [this](CallKind kind) { return judge(kind); },
           [this](std::function<void()> statement) {
-            const uint64_t key = ++cluster_.last_statement_;
-            cluster_.statements_[key] = std::move(statement);
-            const auto delay = std::chrono::milliseconds(cluster_.random_.below(15000));
-            cluster_.queue_.insert({cluster_.local_ + delay, {Role::kStatement, key}});
+            cluster_.execute_later(std::chrono::milliseconds(cluster_.random_.below(15000)), std::move(statement));
           },
           [this](CallKind kind, CallFate fate) { pass_time(kind, fate); }) {
   const auto clock = [this] { return cluster_.local_; };
@@ -322,7 +337,7 @@ inline void SimulatedCluster::Daemon::start_leading(const LedScene& scene) {
 
 inline void SimulatedCluster::Daemon::stop_leading(SceneKey scene, server::Token token, server::StopReason reason) {
   const auto led = led_.find(scene);
-  if (led == led_.end() || led->second.row.token != token)
+  if (led == led_.end() || led->second.lease->token() != token)
     cluster_.fault_ = "a scene was stopped that was not led";
   else
     led_.erase(led);

@@ -55,6 +55,15 @@ class SimulatedEngine : public server::ClusterEngine {
       scenes_.erase(found);
     }
   }
+  // Makes the token of a scene higher without another leader, as its leader does to fence a lost append. Returns false
+  // if leader or token differ.
+  bool raise_token(SceneKey key, MemberId leader, Token token) {
+    const MutexLock lock(mutex_);
+    const auto found = scenes_.find(key);
+    if (found == scenes_.end() || found->second.leader != leader || found->second.token != token) return false;
+    ++found->second.token;
+    return true;
+  }
   // Returns the row of a scene. Precondition: it exists.
   LeaderRow row(SceneKey key) const {
     const MutexLock lock(mutex_);

@@ -194,6 +194,28 @@ TEST_F(LeadershipTest, AFencedLeaderStopsAtOnce) {
   EXPECT_THAT(daemons_[0]->stops, Contains(StopReason::kFenced));
 }
 
+TEST_F(LeadershipTest, ALeaderThatRaisedItsTokenLeadsOnWithTheSameLease) {
+  create_at(*daemons_[0], 1);
+  const std::shared_ptr<const SceneLease> lease = daemons_[0]->leadership().find(1);
+  ASSERT_TRUE(cluster_.raise_token(*daemons_[0], 1, milliseconds(5)));
+  cluster_.run(seconds(12));
+  EXPECT_THAT(daemons_[0]->stops, IsEmpty()) << "a comparison found the new token";
+  EXPECT_EQ(lease->token(), 2u);
+  EXPECT_TRUE(lease->living());
+  follow(*daemons_[1], 1);
+  EXPECT_EQ(move(*daemons_[0], 1, daemons_[1]->id()), absl::OkStatus()) << "with the new token";
+  EXPECT_EQ(leader(1), daemons_[1]);
+}
+
+TEST_F(LeadershipTest, ATokenThatAComparisonNoticedFirstIsLedAnew) {
+  create_at(*daemons_[0], 1);
+  ASSERT_TRUE(cluster_.raise_token(*daemons_[0], 1, milliseconds(500)));
+  daemons_[0]->leadership().reconcile_soon();
+  cluster_.run(seconds(2));
+  EXPECT_EQ(daemons_[0]->stops, std::vector<StopReason>{StopReason::kFenced});
+  EXPECT_EQ(cluster_.unled({1}), "");
+}
+
 TEST_F(LeadershipTest, ADeletedSceneIsNoticed) {
   create_at(*daemons_[0], 1);
   cluster_.engine().remove_scene(1);

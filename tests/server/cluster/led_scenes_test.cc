@@ -53,6 +53,20 @@ TEST_F(LedScenesTest, AStopOfTheNewLeaseIsNotAmongTheStopsBeforeItsStart) {
   EXPECT_THAT(led_.take_stopped(), SizeIs(1));
 }
 
+TEST_F(LedScenesTest, ARaisedTokenContinuesTheLease) {
+  const auto lease = led_.start(led_row(5, 3), member_).lease;
+  EXPECT_FALSE(led_.raise(5, 2, 3));
+  EXPECT_FALSE(led_.raise(6, 3, 4));
+  EXPECT_TRUE(led_.raise(5, 3, 4));
+  EXPECT_EQ(lease->token(), 4u);
+  EXPECT_NE(lease->state(), SceneLease::State::kStopped);
+  EXPECT_EQ(led_.start(led_row(5, 4), member_).lease, nullptr) << "it is led with this token";
+  EXPECT_FALSE(led_.stop(5, 3, StopReason::kFenced));
+  EXPECT_TRUE(led_.stop(5, 4, StopReason::kFenced));
+  EXPECT_FALSE(led_.raise(5, 4, 5));
+  EXPECT_EQ(led_.take_stopped()[0].token, 4u);
+}
+
 TEST_F(LedScenesTest, ATakenSceneHasNoStopForTheHost) {
   const auto lease = led_.start(led_row(5, 3), member_).lease;
   EXPECT_EQ(led_.take(5), 3u);
