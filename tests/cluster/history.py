@@ -169,10 +169,10 @@ class Recorder:
             self._file.write(json.dumps(line) + "\n")
             self._file.flush()
 
-    def invoke(self, kind, scene, process, **asked):
-        """Records that a call is about to be sent. Returns the call."""
+    def invoke(self, kind, scene, process, begin=None, **asked):
+        """Records that a call is about to be sent, or was sent at `begin`. Returns the call."""
         with self._lock:
-            call = Call(kind, scene, process, time.monotonic_ns(), **asked)
+            call = Call(kind, scene, process, time.monotonic_ns() if begin is None else begin, **asked)
             self._numbers[id(call)] = len(self.history.calls)
             self.history.calls.append(call)
             values = to_json({name: getattr(call, name) for name in ASKED})
