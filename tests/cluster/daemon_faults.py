@@ -3,16 +3,12 @@
 Not here are the faults that need hooks in a daemon, since locusd has none, and `upgrade-daemon` if there is no second locusd with
 another apply_version.
 """
-import contextlib
 import random
 import time
 
-import psycopg2
-
-from daemons import DOWN, FROZEN
 from engine import CUT, HUNG, OPEN
 from engine_faults import AWAKE_SECONDS, DETECTION_SECONDS
-from fault_plan import DAEMONS, ENGINE, STORED, names
+from fault_plan import DAEMONS, ENGINE, names
 
 SPLIT_SECONDS = 10  # after a daemon was cut off or frozen it may lead a scene without a log for so long on
 STATEMENT_SECONDS = 5
@@ -31,10 +27,9 @@ class DaemonFaults:
     times in which a scene without a log may be led twice are recorded. `upgraded` is the path of another locusd.
     """
 
-    def __init__(self, daemons, scenes, recorder=None, upgraded="", engine_faults=None):
+    def __init__(self, daemons, scenes, recorder=None, upgraded=""):
         self.daemons, self.scenes, self.recorder, self.upgraded = daemons, list(scenes), recorder, upgraded
         self.engine = daemons.engine if daemons else None
-        self.engine_faults = engine_faults
         self.hits = 0  # faults of STORED that found a row
 
     def actions(self):
@@ -197,10 +192,6 @@ class DaemonFaults:
     # The end.
 
     def repair(self):
-        """Undoes what an interrupted plan left."""
-        with contextlib.suppress(psycopg2.Error):
-            self.engine.repair()
+        """Opens all links, and makes all nodes and daemons run."""
+        self.engine.repair()
         self.daemons.repair()
-
-
-__all__ = ["DOWN", "DaemonFaults", "FROZEN", "STORED"]

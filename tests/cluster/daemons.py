@@ -60,14 +60,14 @@ class Daemon:
 
 
 class Daemons:
-    """A context manager. With an `engine`, the daemons are a cluster on it and end with it; without, there are a keeper and a data
-    directory for each daemon, and `count` is 1 as a rule. `options` are further options of every daemon.
+    """A context manager. With an `engine`, the daemons are a cluster on it and end with it. Without, each is alone, with a data
+    directory if `stored`. `options` are further options of every daemon.
     """
 
-    def __init__(self, count, engine=None, options=(), program=LOCUSD, life_seconds=LIFE_SECONDS):
+    def __init__(self, count, engine=None, stored=True, options=(), program=LOCUSD, life_seconds=LIFE_SECONDS):
         if unavailable():
             raise DaemonError(unavailable())
-        self.engine, self.options, self.program = engine, list(options), program
+        self.engine, self.stored, self.options, self.program = engine, stored, list(options), program
         self.keeper = engine.keeper if engine else Keeper(life_seconds)
         self.daemons, self.caller = [], None
         try:
@@ -128,7 +128,7 @@ class Daemons:
         if self.engine:
             stored = ["--cluster", self.engine.postgresql_url(daemon.name), "--advertise", daemon.advertised]
         else:
-            stored = ["--data-dir", daemon.data]
+            stored = ["--data-dir", daemon.data] if self.stored else []
         return [self.program, "--listen", daemon.address, "--port-file", port_file, "--http-listen", "", "--end-with-parent",
                 str(os.getpid()), "--drain-grace-s", str(DRAIN_GRACE), *stored, *self.options]
 

@@ -149,6 +149,8 @@ class Service:
         if what == "set":
             for name in command["names"]:
                 self.links[name].set(command["state"])
+        elif what == "states":
+            return {"states": {name: link.state for name, link in self.links.items()}}
         elif what == "guard":
             self.guarded[command["pid"]] = started_at(command["pid"])
         elif what == "release":

@@ -24,7 +24,7 @@ PAUSE_SECONDS = 0.002     # between the calls of a client
 RETRY_SECONDS = (0.02, 1)  # least and greatest pause after a failure
 RECENT = 10               # revisions before the newest one that a client asks for by `exactly`
 SERIALS = 1_000_000       # updates of a client; times the clients they are exact as floats
-DURABILITY = {"memory": 1, "local": 2, "replicated": 3}
+MEMORY = {"durability": 1}  # SceneSpec of a scene without a log
 
 
 class Group:
@@ -35,16 +35,12 @@ class Group:
         self.recorder, self.clustered = recorder, clustered
         self.stopped = threading.Event()
 
-    def set_up(self, scenes, durability=None, followers=0):
-        """Uploads a mesh, and creates scenes. `durability` and `followers` are those of SceneSpec."""
-        caller = Caller(self.addresses)
-        spec = {"durability": DURABILITY[durability]} if durability else {}
-        if followers:
-            spec["followers"] = followers
-        with contextlib.closing(caller):
-            self.until_done(lambda name: self.upload(name))
-            for scene in scenes:
-                self.until_done(lambda name, scene=scene: self.done(
+    def set_up(self, scenes):
+        """Uploads a mesh, and creates scenes: names with fields of their SceneSpec."""
+        with contextlib.closing(Caller(self.addresses)) as caller:
+            self.until_done(self.upload)
+            for scene, spec in scenes.items():
+                self.until_done(lambda name, scene=scene, spec=spec: self.done(
                     caller.call(name, "Scene", "CreateScene", seconds=10, name=scene, if_absent=True, spec=spec)))
 
     def upload(self, name):
@@ -312,14 +308,16 @@ class Client(threading.Thread):
 
 
 class Workload:
-    """Clients of one test: a context manager that runs them. At its end they are stopped."""
+    """Clients of one test: a context manager that runs them. At its end they are stopped. `scenes` are names with fields of their
+    SceneSpec.
+    """
 
-    def __init__(self, daemons, scenes, recorder, clients=4, clustered=False, **spec):
-        self.group, self.scenes = Group(daemons, recorder, clustered), scenes
-        self.group.set_up(scenes, **spec)
+    def __init__(self, daemons, scenes, recorder, clients=4, clustered=False):
+        self.group, self.scenes = Group(daemons, recorder, clustered), list(scenes)
+        self.group.set_up(scenes)
         seed = recorder.history.seed
-        self.clients = [Client(number, self.group, scenes, seed) for number in range(clients)]
-        self.last = Client(clients, self.group, scenes, seed)  # reads all at the end, in the calling thread
+        self.clients = [Client(number, self.group, self.scenes, seed) for number in range(clients)]
+        self.last = Client(clients, self.group, self.scenes, seed)  # reads all at the end, in the calling thread
 
     def __enter__(self):
         for client in self.clients:
