@@ -134,7 +134,7 @@ struct Server::Parts {
   }
 
   ~Parts() {
-    if (storage != nullptr) storage->fences->deliver_to(nullptr);
+    if (storage != nullptr) storage->notices->deliver_to({});
   }
 
   // Makes the server a member of a cluster, which does not begin to lead yet.
@@ -144,7 +144,9 @@ struct Server::Parts {
     cluster = std::make_unique<ClusterScenes>(host, with, address);
     host.cluster_meshes = meshes.get();
     host.cluster = cluster.get();
-    with.fences->deliver_to([this](SceneKey scene, uint64_t token) { cluster->fenced(scene, token); });
+    with.notices->deliver_to(
+        {[this](SceneKey scene, uint64_t token) { cluster->fenced(scene, token); },
+         [this](SceneKey scene, uint64_t before, uint64_t now) { cluster->token_raised(scene, before, now); }});
   }
 
   // Declared first and so destroyed last, because work that ends while `host` is destroyed may post to the loops.

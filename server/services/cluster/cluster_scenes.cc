@@ -137,8 +137,11 @@ absl::Status ClusterScenes::missing(const std::string& name) {
   return row ? elsewhere(*row) : no_scene(name);
 }
 
-absl::Status ClusterScenes::elsewhere(const CatalogueScene& row) const {
-  if (row.member != 0 && row.member == member_.id()) return being_read(row.name);
+absl::Status ClusterScenes::elsewhere(const CatalogueScene& row) {
+  if (row.member != 0 && row.member == member_.id()) {
+    member_.look_soon();  // this caller knows it before this daemon's next beat
+    return being_read(row.name);
+  }
   Refusal refusal;
   refusal.reason = Reason::kElsewhere;
   refusal.field = "scene";
@@ -160,7 +163,7 @@ absl::Status ClusterScenes::remove(const std::string& name) {
     const auto found = std::find_if(led_.begin(), led_.end(), [&](const auto& led) { return led.second.name == name; });
     if (found != led_.end()) {
       key = found->first;
-      token = found->second.token;
+      token = found->second.lease->token();
       scene = found->second.scene;
     }
   }
@@ -216,7 +219,8 @@ uint64_t ClusterScenes::load() {
 void ClusterScenes::start_leading(const LedScene& scene) {
   {
     const MutexLock lock(mutex_);
-    led_[scene.row.key] = Led{scene.row.token, scene.lease, "", nullptr};
+    led_[scene.row.key] = Led{scene.lease, "", nullptr};
+    leaving_.erase(scene.row.key);
   }
   ++begun_;
   const absl::StatusOr<uint64_t> queued = readers_.submit(scene.row.key, [this, scene](uint64_t) { read(scene); });
@@ -228,7 +232,7 @@ void ClusterScenes::stop_leading(SceneKey key, Token token, StopReason reason) {
   {
     const MutexLock lock(mutex_);
     const auto found = led_.find(key);
-    if (found == led_.end() || found->second.token != token) return;
+    if (found == led_.end() || found->second.lease->token() != token) return;
     stopped = std::move(found->second);
     led_.erase(found);
     if (stopped.scene != nullptr) {
@@ -236,6 +240,7 @@ void ClusterScenes::stop_leading(SceneKey key, Token token, StopReason reason) {
       stopped.scene->close(no_leader("the leadership of the scene has ended here", kReadingMs));
     }
     if (!stopped.name.empty()) host_.registry.drop_scene(stopped.name);
+    if (!stopped.name.empty() && reason == StopReason::kHandedOver) leaving_[key] = stopped.name;
   }
   if (reason == StopReason::kFenced) ++fenced_;
   if (stopped.name.empty()) return;
@@ -254,8 +259,22 @@ void ClusterScenes::stop_leading(SceneKey key, Token token, StopReason reason) {
 }
 
 void ClusterScenes::leader_changed(const LeaderRow& row) {
+  CatalogueScene scene;
+  {
+    const MutexLock lock(mutex_);
+    const auto left = leaving_.find(row.key);
+    if (left == leaving_.end()) return;
+    scene.name = std::move(left->second);
+    leaving_.erase(left);
+  }
+  scene.key = row.key;
+  scene.epoch = row.epoch;
+  scene.member = row.leader;
+  scene.token = row.token;
+  scene.last_sequence = row.last_sequence;
+  directory_.store(scene.name, scene);  // callers are told at once
   log(LogLevel::kInfo, "scene has a new leader",
-      {{"scene", absl::StrCat(row.key)}, {"member", absl::StrCat(row.leader)}, {"token", absl::StrCat(row.token)}});
+      {{"scene", scene.name}, {"member", absl::StrCat(row.leader)}, {"token", absl::StrCat(row.token)}});
 }
 
 void ClusterScenes::read(const LedScene& led) {

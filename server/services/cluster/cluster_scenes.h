@@ -49,6 +49,8 @@ class ClusterScenes final : public ClusterHost {
   void start();
   // Ends a leadership whose append was refused, because another member leads the scene. Never waits.
   void fenced(SceneKey scene, Token token) { member_.fenced(scene, token); }
+  // Leads a scene on with the token by which the log has fenced a lost append. Never waits.
+  void token_raised(SceneKey scene, Token before, Token now) { member_.token_raised(scene, before, now); }
   // Writes snapshots, hands all scenes over and leaves the cluster. Waits until `deadline` at most.
   void drain(std::chrono::steady_clock::time_point deadline);
 
@@ -93,14 +95,13 @@ class ClusterScenes final : public ClusterHost {
   uint64_t load() override;
   void start_leading(const LedScene& scene) override LOCUS_EXCLUDES(mutex_);
   void stop_leading(SceneKey scene, Token token, StopReason reason) override LOCUS_EXCLUDES(mutex_);
-  void leader_changed(const LeaderRow& row) override;
+  void leader_changed(const LeaderRow& row) override LOCUS_EXCLUDES(mutex_);
   std::vector<FollowedScene> followed_scenes(MemberId) override { return {}; }
   std::vector<MemberId> caught_up_followers(SceneKey) override { return {}; }
 
  private:
   // A scene that this daemon leads, or begins to lead.
   struct Led {
-    Token token = 0;
     std::shared_ptr<const SceneLease> lease;
     std::string name;  // empty until the scene is read
     ScenePtr scene;    // null until the scene is registered, and if it is damaged
@@ -112,7 +113,7 @@ class ClusterScenes final : public ClusterHost {
   // Makes a scene visible if this daemon still leads it. A null scene is damaged: see `damage`.
   void publish(const LedScene& led, const std::string& name, const ScenePtr& scene, const absl::Status& damage)
       LOCUS_EXCLUDES(mutex_);
-  absl::Status elsewhere(const CatalogueScene& row) const;
+  absl::Status elsewhere(const CatalogueScene& row);
   std::shared_ptr<const SceneLease> lease_of(const Scene& scene) const LOCUS_EXCLUDES(mutex_);
   // Returns the key of a scene that is in the registry; 0 if it is not led any more.
   SceneKey key_of(const Scene& scene) const LOCUS_EXCLUDES(mutex_);
@@ -127,6 +128,8 @@ class ClusterScenes final : public ClusterHost {
   mutable Mutex mutex_;
   absl::flat_hash_map<SceneKey, Led> led_ LOCUS_GUARDED_BY(mutex_);
   absl::flat_hash_map<const Scene*, SceneKey> keys_ LOCUS_GUARDED_BY(mutex_);  // of the scenes in led_
+  // Names of the scenes that are being handed over.
+  absl::flat_hash_map<SceneKey, std::string> leaving_ LOCUS_GUARDED_BY(mutex_);
   std::atomic<uint64_t> begun_{0};
   std::atomic<uint64_t> fenced_{0};
   std::atomic<bool> ended_{false};

@@ -13,13 +13,17 @@ absl::StatusOr<ClusterStorage> open_cluster(const ServerConfig& config) {
   ASSIGN_OR_RETURN(const EngineAddress address, EngineAddress::parse(config.cluster));
   for (size_t host = 0; host < address.host_count(); ++host)
     absl::StrAppend(&storage.hosts, host == 0 ? "" : ",", address.host_name(host));
-  storage.fences = std::make_unique<FenceNotices>();
+  storage.notices = std::make_unique<LogNotices>();
   PostgresOptions options;
   options.url = config.cluster;
   options.replication =
       config.engine_replication == ReplicatedBy::kStorage ? EngineReplication::kStorage : EngineReplication::kStandbys;
   options.list_catalogue = false;
-  options.on_fenced = [fences = storage.fences.get()](SceneKey scene, uint64_t token) { fences->notify(scene, token); };
+  LogNotices* const notices = storage.notices.get();
+  options.on_fenced = [notices](SceneKey scene, uint64_t token) { notices->fenced(scene, token); };
+  options.on_token = [notices](SceneKey scene, uint64_t before, uint64_t now) {
+    notices->token_raised(scene, before, now);
+  };
   ASSIGN_OR_RETURN(storage.log, PostgresLog::open(options));
   ASSIGN_OR_RETURN(storage.engine, PostgresCluster::open(options));
   return storage;

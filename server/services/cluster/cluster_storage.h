@@ -16,18 +16,26 @@ namespace locus::server {
 
 // Connects the log with whoever leads the scenes, which begins after the log was opened and ends before it is closed.
 // Any thread may call the members.
-class FenceNotices {
+class LogNotices {
  public:
-  using Receiver = std::function<void(SceneKey, uint64_t token)>;
+  struct Receiver {
+    // See PostgresOptions.
+    std::function<void(SceneKey, uint64_t token)> on_fenced;
+    std::function<void(SceneKey, uint64_t before, uint64_t now)> on_token;
+  };
 
-  // Sets the function that is called for each leadership that was fenced; null: nobody. Waits for a running call.
+  // Sets the functions that are called; empty ones: nobody. Waits for a running call.
   void deliver_to(Receiver receiver) LOCUS_EXCLUDES(mutex_) {
     const MutexLock lock(mutex_);
     receiver_ = std::move(receiver);
   }
-  void notify(SceneKey scene, uint64_t token) LOCUS_EXCLUDES(mutex_) {
+  void fenced(SceneKey scene, uint64_t token) LOCUS_EXCLUDES(mutex_) {
     const MutexLock lock(mutex_);
-    if (receiver_ != nullptr) receiver_(scene, token);
+    if (receiver_.on_fenced != nullptr) receiver_.on_fenced(scene, token);
+  }
+  void token_raised(SceneKey scene, uint64_t before, uint64_t now) LOCUS_EXCLUDES(mutex_) {
+    const MutexLock lock(mutex_);
+    if (receiver_.on_token != nullptr) receiver_.on_token(scene, before, now);
   }
 
  private:
@@ -36,7 +44,7 @@ class FenceNotices {
 };
 
 struct ClusterStorage {
-  std::unique_ptr<FenceNotices> fences;  // before the log, which calls it
+  std::unique_ptr<LogNotices> notices;  // before the log, which calls it
   std::unique_ptr<PostgresLog> log;
   std::unique_ptr<PostgresCluster> engine;
   std::string hosts;  // of the engine, without user and password

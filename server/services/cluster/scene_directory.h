@@ -43,6 +43,8 @@ class SceneDirectory {
   // Returns what is known of the scene without waiting: UNAVAILABLE, NO_LEADER, if that is nothing or too old; then the
   // scene is being looked up.
   absl::StatusOr<std::optional<CatalogueScene>> known(const std::string& name) LOCUS_EXCLUDES(mutex_);
+  // Records what another source says of the scene. Older news than what is known has no effect.
+  void store(const std::string& name, const std::optional<CatalogueScene>& scene) LOCUS_EXCLUDES(mutex_);
   // Makes the next known() look the scene up.
   void forget(const std::string& name) LOCUS_EXCLUDES(mutex_);
 
@@ -64,7 +66,6 @@ class SceneDirectory {
   void run() LOCUS_EXCLUDES(mutex_);
   // Reads the members if the list is older than kFresh or lacks `wanted`.
   void refresh_members(MemberId wanted) LOCUS_EXCLUDES(mutex_);
-  void store(const std::string& name, const std::optional<CatalogueScene>& scene) LOCUS_EXCLUDES(mutex_);
   void ask(const std::string& name) LOCUS_REQUIRES(mutex_);
 
   const PostgresLog& log_;

@@ -142,7 +142,7 @@ TEST_F(ClusterScenesTest, EveryServerKnowsTheMembersAndTheEngine) {
     std::set<std::string> zones;
     for (const v1::ClusterMember& member : cluster.members()) {
       zones.insert(member.zone());
-      if (member.id() == cluster.member()) EXPECT_EQ(member.address(), servers_[at]->address());
+      EXPECT_EQ(member.id() == cluster.member(), member.address() == servers_[at]->address());
     }
     EXPECT_EQ(zones, (std::set<std::string>{"a", "b", "c"}));
   }
