@@ -6,7 +6,6 @@
 #include <optional>
 #include <set>
 #include <utility>
-#include <variant>
 #include <vector>
 
 #include "absl/strings/escaping.h"
@@ -14,7 +13,7 @@
 #include "core/base/check.h"
 #include "core/base/status_macros.h"
 #include "core/scene/log/mesh_codec.h"
-#include "core/scene/log/record_codec.h"
+#include "core/scene/log/record_applier.h"
 #include "core/scene/log/tree_codec.h"
 #include "core/scene/spec_codec.h"
 
@@ -88,13 +87,16 @@ class Replay {
   Replay(const StoredScene& stored, SceneWriter& writer, Meshes& meshes, const RecoveryProgress& progress)
       : stored_(stored), writer_(writer), meshes_(meshes), progress_(progress), last_(stored.snapshot_sequence) {}
 
+  // Applies the next record. Ignores records that were logged after the scene was looked up.
   absl::Status apply(const LogRecord& record) {
+    if (record.sequence > stored_.last_sequence) return absl::OkStatus();
     if (record.sequence != last_ + 1)
       return data_loss(absl::StrCat("record ", record.sequence, " follows record ", last_));
     absl::Status status = enter_epoch(record.entry.epoch);
     absl::StatusOr<Record> decoded = Record::decode(record.entry.bytes);
     if (status.ok()) status = decoded.status();
-    if (status.ok()) status = apply(decoded->content());
+    const auto find_mesh = [this](const MeshKey& key, const Aabbf* bounds) { return meshes_(key, bounds); };
+    if (status.ok()) status = apply_record(writer_, decoded->content(), find_mesh).status();
     if (!status.ok()) return named(absl::StrCat("record ", record.sequence), status);
     last_ = record.sequence;
     if (progress_ != nullptr && (done() % kRecordsPerReport == 0 || last_ == stored_.last_sequence))
@@ -122,33 +124,6 @@ class Replay {
     if (epoch == 0 || ended_epochs_.contains(epoch))
       return data_loss(absl::StrCat("epoch ", epoch, " follows epoch ", writer_.epoch()));
     writer_.restart(epoch);
-    return absl::OkStatus();
-  }
-
-  // Applies the content of one record. A batch that was refused when it was logged is refused again and has no effect,
-  // so its error is ignored.
-  absl::Status apply(Record::Content& content) {
-    if (const auto* batch = std::get_if<UpdateBatch>(&content); batch != nullptr) {
-      writer_.apply(*batch).IgnoreError();
-      return absl::OkStatus();
-    }
-    if (const auto* joined = std::get_if<Record::Joined>(&content); joined != nullptr) {
-      std::vector<const UpdateBatch*> batches;
-      for (const UpdateBatch& batch : joined->batches) batches.push_back(&batch);
-      return writer_.apply_joined(batches, [] { return absl::OkStatus(); }).status();
-    }
-    return apply(std::get<Record::Change>(content));
-  }
-
-  absl::Status apply(Record::Change& change) {
-    for (size_t i = 0; i < change.meshes.size(); ++i)
-      change.change.place[i].mesh = meshes_(change.meshes[i], change.bounds.empty() ? nullptr : &change.bounds[i]);
-    const auto is_object = [this](Id id) { return writer_.is_object(id); };
-    absl::StatusOr<StaticSet::Changed> changed =
-        writer_.statics()->apply(change.change, is_object, ids_from(kFirstChosenId));
-    // The change was valid when it was logged, so an error means damage.
-    if (!changed.ok()) return data_loss(absl::StrCat("the change is wrong: ", changed.status().message()));
-    writer_.replace_statics(std::move(changed->set));
     return absl::OkStatus();
   }
 

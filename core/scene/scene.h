@@ -28,6 +28,7 @@
 #include "absl/container/flat_hash_set.h"
 #include "absl/functional/function_ref.h"
 #include "core/base/mutex.h"
+#include "core/scene/log/record_applier.h"
 #include "core/scene/log/scene_journal.h"
 #include "core/scene/log/scene_state.h"
 #include "core/scene/readers/reader_tracker.h"
@@ -178,6 +179,17 @@ class Scene {
   // are not blocked while a change builds the new tree of instances. Waits like apply() while readers exceed their
   // budget, but without a deadline. Returns NOT_FOUND if a placed mesh was deleted: see check_meshes().
   absl::StatusOr<InstanceChange> change_instances(const StaticChange& change) LOCUS_EXCLUDES(writer_mutex_, mutex_);
+
+  // Applies one record that another server, which leads the scene, has logged, and publishes the revision that it
+  // makes: the same as the leader's, with equal answers. Precondition: the scene has no log. Waits like apply() while
+  // readers exceed their budget. Returns the latest revision after the record. Errors, after which the state is that
+  // before the record: DATA_LOSS if the record is damaged or does not fit the state; FAILED_PRECONDITION if it belongs
+  // to another epoch; NOT_FOUND, or the reason of close(), if the scene is closed; DEADLINE_EXCEEDED.
+  absl::StatusOr<SnapshotPtr> follow(const LogEntry& record, const MeshOfRecord& find_mesh,
+                                     Deadline until = ReaderTracker::kNever) LOCUS_EXCLUDES(writer_mutex_, mutex_);
+  // Makes a scene that follows the leader of its log: from now on its changes are appended to `log`, whose last record
+  // is the last one that was passed to follow(). Precondition: the scene has no log.
+  void begin_leading(const SceneLog& log) LOCUS_EXCLUDES(writer_mutex_, mutex_);
 
   // Returns `count` ids for instances that will be placed. No object and no instance of the latest revision has these
   // ids, and change_instances() chooses none of them for other instances. Chosen ids count up from kFirstChosenId, so

@@ -39,18 +39,23 @@ class RecoveryLockstep {
     for (int step = 0; step < steps; ++step) {
       std::string what = take_step();
       if (what.empty()) what = scene_difference(*scene_, *model_, random_);
+      if (what.empty()) what = follow();
       if (!what.empty()) return absl::StrCat("step ", step, ": ", what);
     }
     return "";
   }
 
   uint64_t crashes() const { return crashes_; }
+  // Returns the number of followed records, and how often the follower became the leader.
+  uint64_t followed() const { return followed_; }
+  uint64_t promotions() const { return promotions_; }
   uint64_t lost() const { return lost_; }
   uint64_t turned_up() const { return turned_up_; }
 
  private:
   static constexpr uint64_t kIds = 60;
   static constexpr uint64_t kEpoch = 5;
+  static constexpr uint64_t kAllRecords = 1'000'000;
 
   // Change of instances: the instance to remove and the instance to place.
   struct Change {
@@ -85,6 +90,41 @@ class RecoveryLockstep {
     if (!full) return what;
     log_->fail_with(absl::OkStatus());
     return what.empty() && random_.chance(0.3) ? crash() : what;
+  }
+
+  MeshPtr mesh_of(const Sha256& sha256) const {
+    return sha256[0] == 0 || sha256[0] > meshes_.size() ? nullptr : meshes_[size_t{sha256[0]} - 1];
+  }
+
+  // Applies to a follower the records that it does not have yet, and compares it with the model. Begins another
+  // follower at times, and lets a follower become the leader at others.
+  std::string follow() {
+    if (follower_ == nullptr || random_.chance(0.02)) {
+      const StoredScene stored = MemoryLog(log_->crash(kAllRecords)).stored_scenes().front();
+      absl::StatusOr<ScenePtr> begun = recover_scene(
+          *log_, stored, [this](const MeshKey& key) { return mesh_of(key.sha256); }, nullptr, LogUse::kReadOnly);
+      if (!begun.ok()) return absl::StrCat("beginning to follow: ", begun.status().ToString());
+      follower_ = *std::move(begun);
+      followed_sequence_ = stored.last_sequence;
+    }
+    const auto apply_next = [this](const LogRecord& record) -> absl::Status {
+      const auto find = [this](const MeshKey& key, const Aabbf*) { return mesh_of(key.sha256); };
+      if (absl::Status status = follower_->follow(record.entry, find).status(); !status.ok()) return status;
+      ++followed_;
+      followed_sequence_ = record.sequence;
+      return absl::OkStatus();
+    };
+    if (absl::Status read = log_->read(scene_->log_key(), followed_sequence_ + 1, apply_next); !read.ok())
+      return absl::StrCat("following: ", read.ToString());
+    if (std::string what = scene_difference(*follower_, *model_, random_); !what.empty())
+      return absl::StrCat("the follower: ", what);
+    if (!random_.chance(0.02)) return "";
+    ++promotions_;
+    snapshot_.reset();
+    const SceneLog log{log_.get(), scene_->log_key(), ack_level(spec_.durability), scene_->log_position()};
+    scene_ = std::move(follower_);
+    scene_->begin_leading(log);
+    return "";
   }
 
   std::string change_scene() {
@@ -255,16 +295,15 @@ class RecoveryLockstep {
   // acknowledged change.
   std::string crash() {
     ++crashes_;
+    follower_ = nullptr;  // it may have followed records that the log loses
     snapshot_.reset();
     const uint64_t acknowledged = scene_->log_position().sequence;
     const bool memory = spec_.durability == Durability::kMemory;
     log_ = std::make_unique<MemoryLog>(log_->crash(memory ? random_.below(20) : 0, random_.below(4)));
     const StoredScene& stored = log_->stored_scenes().front();
     if (!memory && stored.last_sequence < acknowledged) return "the log lost something";
-    absl::StatusOr<ScenePtr> recovered = recover_scene(*log_, stored, [this](const MeshKey& key) {
-      const Sha256& sha256 = key.sha256;
-      return sha256[0] == 0 || sha256[0] > meshes_.size() ? nullptr : meshes_[size_t{sha256[0]} - 1];
-    });
+    absl::StatusOr<ScenePtr> recovered =
+        recover_scene(*log_, stored, [this](const MeshKey& key) { return mesh_of(key.sha256); });
     if (!recovered.ok()) return recovered.status().ToString();
     scene_ = *std::move(recovered);
     if (scene_->spec().labels != spec_.labels) return "labels";
@@ -297,6 +336,10 @@ class RecoveryLockstep {
   std::vector<MeshPtr> meshes_;
   std::unique_ptr<MemoryLog> log_;
   ScenePtr scene_;
+  ScenePtr follower_;               // null until the first step, and after a crash
+  uint64_t followed_sequence_ = 0;  // of the last record that the follower has
+  uint64_t followed_ = 0;
+  uint64_t promotions_ = 0;
   std::unique_ptr<Scene> model_;
   std::vector<Deed> deeds_;      // deeds (changes of the scene), one for each record of the log
   std::vector<Deed> tentative_;  // deeds of the last append, if it failed

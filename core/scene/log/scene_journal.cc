@@ -31,6 +31,15 @@ void SceneJournal::check_invariants() const {
   LOCUS_CHECK(position_.bytes == 0 || position_.sequence > position_.snapshot_sequence);
 }
 
+void SceneJournal::begin(const SceneLog& log) {
+  LOCUS_CHECK(!on() && log.log != nullptr);
+  log_ = log;
+  key_ = log.key;
+  const MutexLock lock(mutex_);
+  position_ = log.position;
+  LOCUS_DCHECK_CALL(check_invariants());
+}
+
 void SceneJournal::end_record(uint64_t epoch, const UpdateBatch& batch) {
   entries_.push_back({epoch, batch.writer, batch.batch, {}});
   ends_.push_back(bytes_.size());

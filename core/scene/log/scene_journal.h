@@ -7,6 +7,7 @@
 #ifndef LOCUS_CORE_SCENE_LOG_SCENE_JOURNAL_H_
 #define LOCUS_CORE_SCENE_LOG_SCENE_JOURNAL_H_
 
+#include <atomic>
 #include <string>
 #include <vector>
 
@@ -36,10 +37,13 @@ struct SceneLog {
 
 class SceneJournal {
  public:
-  explicit SceneJournal(const SceneLog& log) : log_(log), position_(log.position) {}
+  explicit SceneJournal(const SceneLog& log) : log_(log), key_(log.key), position_(log.position) {}
 
   bool on() const { return log_.log != nullptr; }
-  SceneKey key() const { return log_.key; }
+  // Returns the key of the scene in its log; 0 without a log. Any thread.
+  SceneKey key() const { return key_.load(); }
+  // Begins to append to `log`, whose last record is the last one that the scene has applied. Precondition: !on().
+  void begin(const SceneLog& log) LOCUS_EXCLUDES(mutex_);
 
   // Appends one record for each batch, with a single sync. After an error, treat all batches as not logged: see
   // UpdateLog.
@@ -73,7 +77,8 @@ class SceneJournal {
   void end_record(uint64_t epoch, const UpdateBatch& batch);
   absl::Status append(AckLevel level) LOCUS_EXCLUDES(mutex_);
 
-  const SceneLog log_;
+  SceneLog log_;  // changed only by begin()
+  std::atomic<SceneKey> key_;
   // Records that are being appended: bytes_ is their encoding, entries_ has one entry for each record, and ends_ has
   // the end of each record as an offset in bytes_. All three are empty between calls.
   std::string bytes_;

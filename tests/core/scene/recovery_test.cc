@@ -11,14 +11,18 @@ namespace locus::test {
 namespace {
 
 TEST(RecoveryTest, ARecoveredSceneEqualsTheSceneThatAppliedTheLoggedRecords) {
-  uint64_t crashes = 0, lost = 0, turned_up = 0;
+  uint64_t crashes = 0, lost = 0, turned_up = 0, followed = 0, promotions = 0;
   for (uint64_t seed = 0; seed < scaled_count(60); ++seed) {
     RecoveryLockstep lockstep(seed);
     ASSERT_EQ(lockstep.run(300), "") << "seed " << seed;
     crashes += lockstep.crashes();
     lost += lockstep.lost();
     turned_up += lockstep.turned_up();
+    followed += lockstep.followed();
+    promotions += lockstep.promotions();
   }
+  EXPECT_LT(scaled_count(6'000), followed) << "records that a follower applied";
+  EXPECT_LT(scaled_count(60), promotions) << "followers that became leaders";
   EXPECT_LT(scaled_count(60), crashes);
   EXPECT_NE(lost, 0u);
   EXPECT_NE(turned_up, 0u);
