@@ -247,7 +247,10 @@ class SimulatedCluster {
     thread.at = Time::max();
     queue_.insert({thread.at, work});  // so that the step may wake its own thread
     const Time next = role == Role::kBeats ? daemon.membership_->step() : daemon.leadership_->step();
-    if (options_.check_claims) claims_.update(number);
+    if (options_.check_claims) {
+      claims_.update(number);
+      check_leases(daemon);
+    }
     queue_.erase({thread.at, work});
     thread.busy_until = local_;
     thread.at = std::max(std::min(thread.at, next), local_);
@@ -278,6 +281,14 @@ class SimulatedCluster {
         if (!hand_overs_.contains(change.before.leader)) wrong("handed over without a drain or a move");
         break;
     }
+  }
+  // A lease of an earlier member must be stopped, not only expired: the host would wait for it to be renewed.
+  void check_leases(const Daemon& daemon) {
+    const auto member = daemon.membership_->self().lease;
+    for (const auto& [scene, led] : daemon.led_)
+      if (&led.lease->member() != member.get() && led.lease->state() != server::SceneLease::State::kStopped &&
+          fault_.empty())
+        fault_ = absl::StrCat("the lease of scene ", scene, " outlives its member");
   }
   void check_marked(server::MemberId id) {
     if (up_since(last_beats_[id]) < options_.timing.silence && fault_.empty())
