@@ -13,8 +13,8 @@
 #include "core/base/check.h"
 #include "core/base/status_macros.h"
 #include "core/scene/log/mesh_codec.h"
-#include "core/scene/log/record_applier.h"
 #include "core/scene/log/tree_codec.h"
+#include "core/scene/record_applier.h"
 #include "core/scene/spec_codec.h"
 
 namespace locus {

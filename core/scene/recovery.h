@@ -22,7 +22,7 @@ namespace locus {
 // and the number of all records to apply.
 using RecoveryProgress = std::function<void(uint64_t applied, uint64_t of)>;
 
-// What a restored scene does with the log it was read from.
+// Use that a restored scene makes of the log from which it was read.
 enum class LogUse : uint8_t {
   kAppend,    // it appends its changes
   kReadOnly,  // it is a scene without a log, whose changes are not stored

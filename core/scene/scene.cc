@@ -119,7 +119,7 @@ Scene::Scene(std::string name, SceneSpec spec, SceneWriter writer, const SceneLo
 }
 
 absl::Status Scene::closed_status() const {
-  if (!close_reason_.ok()) return close_reason_;
+  RETURN_IF_ERROR(close_reason_);
   Refusal refusal;
   refusal.reason = Reason::kNotFound;
   refusal.field = "scene";
@@ -307,31 +307,6 @@ absl::StatusOr<InstanceChange> Scene::change_instances(const StaticChange& chang
   }
   leave_change(change, result.status());
   return result;
-}
-
-absl::StatusOr<SnapshotPtr> Scene::follow(const LogEntry& record, const MeshOfRecord& find_mesh, Deadline until) {
-  ASSIGN_OR_RETURN(Record decoded, Record::decode(record.bytes));
-  while (true) {
-    RETURN_IF_ERROR(wait_for_readers(until));
-    const MutexLock lock(writer_mutex_);
-    RETURN_IF_ERROR(check_open());
-    LOCUS_CHECK(!journal_.on());
-    if (pins_->over_budget()) continue;
-    if (record.epoch != writer_.epoch())
-      return absl::FailedPreconditionError(
-          absl::StrCat("the record belongs to the epoch ", record.epoch, ", not to ", writer_.epoch()));
-    ASSIGN_OR_RETURN(const SnapshotPtr snapshot, apply_record(writer_, decoded.content(), find_mesh));
-    publish_leases();
-    if (snapshot != nullptr) publish(snapshot);
-    return latest();
-  }
-}
-
-void Scene::begin_leading(const SceneLog& log) {
-  const MutexLock lock(writer_mutex_);
-  journal_.begin(log);
-  const MutexLock state_lock(mutex_);
-  next_chosen_id_ = std::max({next_chosen_id_, latest_->statics->first_id_above(), kFirstChosenId + latest_->revision});
 }
 
 Id Scene::next_chosen_id() {

@@ -127,7 +127,14 @@ void add_security_options(CLI::App& app, ServerConfig& config) {
       ->capture_default_str();
 }
 
-void add_cluster_options(CLI::App& app, ServerConfig& config) {
+void add_storage_options(CLI::App& app, ServerConfig& config) {
+  app.add_option("--data-dir", config.data_dir, "Directory that scenes are kept in; empty = memory only")
+      ->capture_default_str();
+  app.add_option("--snapshot-after", config.snapshot_after,
+                 "Size of a scene's log after which a snapshot replaces it, such as 16MiB")
+      ->transform(CLI::AsSizeValue(false).description("SIZE"))
+      ->check(size_from(limits::kMinSnapshotAfterBytes, "64KiB", ZeroBytes::kRefused))
+      ->capture_default_str();
   app.add_option("--cluster", config.cluster,
                  "Replicated PostgreSQL of the cluster to join: postgresql://host,host,host/database; empty = none")
       ->capture_default_str();
@@ -157,13 +164,7 @@ void add_options(CLI::App& app, ServerConfig& config) {
       ->capture_default_str();
   app.add_option("--http-port-file", config.http_port_file, "File to write the HTTP port to once it answers")
       ->capture_default_str();
-  app.add_option("--data-dir", config.data_dir, "Directory that scenes are kept in; empty = memory only")
-      ->capture_default_str();
-  app.add_option("--snapshot-after", config.snapshot_after,
-                 "Size of a scene's log after which a snapshot replaces it, such as 16MiB")
-      ->transform(CLI::AsSizeValue(false).description("SIZE"))
-      ->check(size_from(limits::kMinSnapshotAfterBytes, "64KiB", ZeroBytes::kRefused))
-      ->capture_default_str();
+  add_storage_options(app, config);
   app.add_option("--threads", config.threads,
                  "Threads that may work on one batch; 0 = the cores that the process may use")
       ->check(CLI::Range(0u, limits::kMaxThreads))
@@ -220,7 +221,6 @@ void add_options(CLI::App& app, ServerConfig& config) {
   app.add_option("--end-with-parent", config.end_with_parent,
                  "Process id of the process that starts the daemon, which then ends together with it; 0 = none")
       ->capture_default_str();
-  add_cluster_options(app, config);
   add_connection_options(app, config);
   add_security_options(app, config);
   app.add_flag("--insecure", config.insecure, "Listen beyond this machine without encryption or access control");

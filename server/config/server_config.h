@@ -20,7 +20,7 @@ enum class LogLevel : uint8_t { kDebug, kInfo, kWarning, kError };
 enum class LogFormat : uint8_t { kText, kJson };
 enum class BatchPriority : uint8_t { kNice, kIdle };
 
-// Who copies each change to a second machine before the engine of a cluster acknowledges it.
+// Part of a cluster's engine that copies each change to a second machine before the engine acknowledges it.
 enum class ReplicatedBy : uint8_t { kStandbys, kStorage };
 
 inline constexpr const char* kDefaultHttpListen = "127.0.0.1:7576";

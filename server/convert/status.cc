@@ -3,6 +3,7 @@
 #include <random>
 #include <string>
 
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 
 namespace locus::server {
@@ -93,6 +94,15 @@ absl::Status recovering() {
   refusal.retry_after_ms = kRecoveryRetryMs;
   return refuse(absl::StatusCode::kUnavailable,
                 "the server is still recovering its scenes from the disk; try again in a moment", refusal);
+}
+
+absl::Status damaged_data(const char* field, const absl::Status& damage) {
+  Refusal refusal;
+  refusal.reason = Reason::kDamaged;
+  refusal.field = field;
+  const char* const advice =
+      absl::StrContains(damage.message(), "locusd") ? "" : "; see `locusd check`, then `locusd repair` or a backup";
+  return refuse(absl::StatusCode::kDataLoss, absl::StrCat(damage.message(), advice), refusal);
 }
 
 }  // namespace locus::server

@@ -32,6 +32,10 @@ absl::Status draining();
 // Returns UNAVAILABLE, REASON_RECOVERING, with the delay after which the caller may retry.
 absl::Status recovering();
 
+// Returns the error for calls that use a damaged scene or mesh, until it is repaired or deleted. `field` names the
+// kind.
+absl::Status damaged_data(const char* field, const absl::Status& damage);
+
 }  // namespace locus::server
 
 #endif  // LOCUS_SERVER_CONVERT_STATUS_H_

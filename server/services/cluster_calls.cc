@@ -11,10 +11,10 @@
 #include "core/scene/spec_codec.h"
 #include "server/convert/convert.h"
 #include "server/convert/status.h"
+#include "server/host/epoch.h"
 #include "server/observability/log.h"
 #include "server/services/cluster/cluster_meshes.h"
 #include "server/services/cluster/cluster_scenes.h"
-#include "server/services/recovery.h"
 #include "server/services/scene_access.h"
 #include "server/services/scene_calls.h"
 

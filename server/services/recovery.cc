@@ -2,18 +2,18 @@
 
 #include <chrono>
 #include <map>
-#include <random>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "core/base/mutex.h"
 #include "core/base/refusal.h"
 #include "core/base/status_macros.h"
 #include "core/scene/recovery.h"
 #include "core/scene/spec_codec.h"
+#include "server/convert/status.h"
+#include "server/host/epoch.h"
 #include "server/observability/log.h"
 
 namespace locus::server {
@@ -173,22 +173,6 @@ void log_snapshot(const Scene& scene, const absl::StatusOr<uint64_t>& bytes) {
 }
 
 }  // namespace
-
-absl::Status damaged_data(const char* field, const absl::Status& damage) {
-  Refusal refusal;
-  refusal.reason = Reason::kDamaged;
-  refusal.field = field;
-  const char* const advice =
-      absl::StrContains(damage.message(), "locusd") ? "" : "; see `locusd check`, then `locusd repair` or a backup";
-  return refuse(absl::StatusCode::kDataLoss, absl::StrCat(damage.message(), advice), refusal);
-}
-
-uint64_t new_epoch() {
-  std::random_device device;
-  uint64_t epoch = 0;
-  while (epoch == 0) epoch = uint64_t{device()} << 32 | device();
-  return epoch;
-}
 
 absl::Status recover_all(Host& host, const std::atomic<bool>& stop) { return Recovery(host, stop).run(); }
 

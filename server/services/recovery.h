@@ -13,14 +13,6 @@
 
 namespace locus::server {
 
-// Returns a new epoch: a random 64-bit number from std::random_device, never 0. An epoch names one unbroken sequence of
-// revisions. Equal epochs are practically impossible, also between runs of the server. Any thread.
-uint64_t new_epoch();
-
-// Returns the error for calls that use a damaged scene or mesh, until it is repaired or deleted. `field` names the
-// kind.
-absl::Status damaged_data(const char* field, const absl::Status& damage);
-
 // Fills host.registry with the meshes and scenes of the log. Call it before calls are served; `host` must have a log
 // and an empty registry. Damage is not an error: it is recorded in the registry. Returns CANCELLED soon after `stop`
 // becomes true. Returns an error of the log other than DATA_LOSS, for example if the disk cannot be read. Blocks; uses

@@ -16,7 +16,7 @@
 
 namespace locus::server {
 
-// Whether a lookup may wait for the engine of a cluster, for about a second, to find out who has a scene.
+// Permission of a lookup to wait for the engine of a cluster, for about a second, to find out who has a scene.
 enum class LookUp : uint8_t { kNeverWaits, kMayWait };
 
 // Checks the scene's name, the metadata x-scene and the caller's right to the scene, then returns the scene. `field` is

@@ -12,12 +12,12 @@
 #include "core/base/status_macros.h"
 #include "server/convert/convert.h"
 #include "server/convert/status.h"
+#include "server/host/epoch.h"
 #include "server/observability/log.h"
 #include "server/rpc/call.h"
 #include "server/services/cluster/cluster_scenes.h"
 #include "server/services/cluster_calls.h"
 #include "server/services/creator_quotas.h"
-#include "server/services/recovery.h"
 #include "server/services/scene_access.h"
 #include "server/services/scene_calls.h"
 

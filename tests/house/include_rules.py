@@ -44,10 +44,11 @@ ALLOWED = {
                    "server/config", "core/base", "proto"],
     "server/host": ["server/rpc", "server/connections", "server/scheduling", "server/observability", "server/config",
                     "core/*"],
-    "server/services/cluster": ["server/services", "server/cluster", "server/host", "server/scheduling", "server/storage",
+    "server/services/cluster": ["server/cluster", "server/host", "server/convert", "server/scheduling", "server/storage",
                                 "server/storage/postgres", "server/observability", "server/config", "core/*", "proto"],
-    "server/services": ["server/services/cluster", "server/rpc", "server/host", "server/connections", "server/convert", "server/scheduling",
-                        "server/storage", "server/security", "server/observability", "server/config", "core/*", "proto"],
+    "server/services": ["server/services/cluster", "server/rpc", "server/host", "server/connections", "server/convert",
+                        "server/scheduling", "server/storage", "server/security", "server/observability", "server/config",
+                        "core/*", "proto"],
     # The client library may include only status_macros.h of core, and only in sources, because this header is not
     # installed.
     "client/lib": ["proto", "core/base/status_macros.h"],

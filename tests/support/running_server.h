@@ -69,8 +69,7 @@ class RunningServer {
                          server::ClusterStorage* cluster = nullptr) {
     server::start_logging(config.log_level, config.log_format);
     server::capture_library_logs(config.log_level);
-    absl::StatusOr<std::unique_ptr<server::Server>> started = 
-        server::Server::start(config, log, kNever, cluster);
+    absl::StatusOr<std::unique_ptr<server::Server>> started = server::Server::start(config, log, kNever, cluster);
     if (!started.ok()) ADD_FAILURE() << started.status();
     LOCUS_CHECK(started.ok());
     server_ = *std::move(started);

@@ -15,9 +15,10 @@
 #include "core/scene/recovery.h"
 #include "core/scene/spec_codec.h"
 #include "server/config/version.h"
+#include "server/convert/status.h"
+#include "server/host/epoch.h"
 #include "server/observability/log.h"
 #include "server/services/cluster/cluster_meshes.h"
-#include "server/services/recovery.h"
 
 namespace locus::server {
 namespace {

@@ -14,8 +14,8 @@
 
 namespace locus::server {
 
-// Connects the log with whoever leads the scenes, which begins after the log was opened and ends before it is closed.
-// Any thread may call the members.
+// Connects the log with the part of the server that leads the scenes, which begins after the log was opened and ends
+// before it is closed. Any thread may call the members.
 class LogNotices {
  public:
   struct Receiver {

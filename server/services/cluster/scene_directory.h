@@ -1,4 +1,4 @@
-// What this daemon knows about scenes that it does not have: which member leads each, and at which address. Entries are
+// Knowledge about scenes that this daemon does not have: which member leads each, and at which address. Entries are
 // read from the engine when a caller asks for a scene, and are at most kFresh old when they answer NOT_FOUND; an older
 // entry about a leader may still answer, because that member knows a newer one.
 //

@@ -1,8 +1,8 @@
 // Applies logged records to the state of a scene: at a restart, and at a server that follows the scene's leader. The
 // result depends only on the record and on the state before it, so every server makes the same revision of it. Plain
 // functions; one thread at a time for one writer.
-#ifndef LOCUS_CORE_SCENE_LOG_RECORD_APPLIER_H_
-#define LOCUS_CORE_SCENE_LOG_RECORD_APPLIER_H_
+#ifndef LOCUS_CORE_SCENE_RECORD_APPLIER_H_
+#define LOCUS_CORE_SCENE_RECORD_APPLIER_H_
 
 #include <functional>
 #include <memory>
@@ -25,4 +25,4 @@ absl::StatusOr<SnapshotPtr> apply_record(SceneWriter& writer, Record::Content& c
 
 }  // namespace locus
 
-#endif  // LOCUS_CORE_SCENE_LOG_RECORD_APPLIER_H_
+#endif  // LOCUS_CORE_SCENE_RECORD_APPLIER_H_

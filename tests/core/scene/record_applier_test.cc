@@ -1,5 +1,5 @@
 // Scenes that follow another server's leader record by record. Random sequences are in recovery_test.cc.
-#include "core/scene/log/record_applier.h"
+#include "core/scene/record_applier.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "core/scene/log/record_applier.h"
+#include "core/scene/record_applier.h"
 
 #include <utility>
 #include <variant>
