@@ -105,6 +105,10 @@ bool Leadership::begin_hand_over() {
     finish_move(*move, absl::NotFoundError("this daemon does not lead the scene"));
     return true;
   }
+  if (!drains && move->to == self_.id) {
+    finish_move(*move, absl::OkStatus());
+    return true;
+  }
   const std::vector<MemberId> followers = host_.caught_up_followers(move->scene);
   if (!drains && !followers.empty() && std::find(followers.begin(), followers.end(), move->to) == followers.end()) {
     finish_move(*move, absl::FailedPreconditionError("the member is no follower that has all records of the scene"));

@@ -35,9 +35,10 @@ class ClusterSchedule {
     cluster_.heal();
     for (int daemon = 0; daemon < 2; ++daemon) start();  // the others may have drained
     cluster_.run(std::chrono::seconds(60));
-    const std::string unled = cluster_.unled(scenes_);
+    const std::string unled = cluster_.unled(scenes_), undrained = cluster_.undrained();
     const std::string fault = cluster_.fault();
-    return fault.empty() ? unled : fault;
+    if (!fault.empty()) return fault;
+    return unled.empty() ? undrained : unled;
   }
 
  private:

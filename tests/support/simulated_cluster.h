@@ -91,8 +91,7 @@ class SimulatedCluster {
     std::unique_ptr<server::Membership> membership_;
     std::unique_ptr<server::Leadership> leadership_;
     Thread beats_, scenes_;
-    Time away_until_;             // cut off from the engine
-    bool may_hand_over_ = false;  // it drains, or a test moves its scenes
+    Time away_until_;  // cut off from the engine
     std::map<SceneKey, LedScene> led_;
   };
 
@@ -149,7 +148,7 @@ class SimulatedCluster {
     away_until_ = outages_.back().second;
   }
   void drain(Daemon& daemon) {
-    daemon.may_hand_over_ = true;
+    permissions_[daemon.number_].drains = true;
     daemon.leadership_->drain();
   }
   // Lets a daemon make the token of a scene that it leads higher, as PostgresLog does; its leadership learns that after
@@ -165,10 +164,25 @@ class SimulatedCluster {
     });
     return true;
   }
-  // Asks a daemon to move a scene.
+  // Asks a daemon to move a scene. Until that is done, the daemon may hand this scene over to this member, once.
   void move(Daemon& daemon, SceneKey scene, server::MemberId to, server::Leadership::MoveDone done = nullptr) {
-    daemon.may_hand_over_ = true;
-    daemon.leadership_->move(scene, to, std::move(done));
+    permissions_[daemon.number_].moves.insert({scene, to});
+    daemon.leadership_->move(scene, to,
+                             [this, number = daemon.number_, scene, to, done = std::move(done)](const absl::Status& s) {
+                               if (!s.ok()) take_permission(number, scene, to);
+                               if (done) done(s);
+                             });
+  }
+  // Returns the first daemon that was to drain and has not, or still leads or lives in the engine; else an empty
+  // string.
+  std::string undrained() {
+    for (const auto& [number, daemon] : daemons_) {
+      if (!permissions_[number].drains) continue;
+      if (!daemon->leadership_->drained()) return absl::StrCat("daemon ", number, " has not drained");
+      for (const auto& [member, owner] : owners_)
+        if (owner == number && engine_.lives(member)) return absl::StrCat("drained daemon ", number, " is a member");
+    }
+    return "";
   }
   // Ends all faults.
   void heal() {
@@ -278,9 +292,22 @@ class SimulatedCluster {
         if (change.leader_lived) wrong("taken over from a living member");
         break;
       case LeaderChange::Cause::kHandOver:
-        if (!hand_overs_.contains(change.before.leader)) wrong("handed over without a drain or a move");
+        if (!may_hand_over(change)) wrong("handed over without a drain, or a move to this member");
         break;
     }
+  }
+  // Removes the permission of a move. Returns false if there was none.
+  bool take_permission(uint64_t daemon, SceneKey scene, server::MemberId to) {
+    auto& moves = permissions_[daemon].moves;
+    const auto found = moves.find({scene, to});
+    if (found == moves.end()) return false;
+    moves.erase(found);
+    return true;
+  }
+  bool may_hand_over(const LeaderChange& change) {
+    const auto owner = owners_.find(change.before.leader);
+    if (owner == owners_.end() || change.after.leader == change.before.leader) return false;
+    return take_permission(owner->second, change.before.key, change.after.leader) || permissions_[owner->second].drains;
   }
   // A lease of an earlier member must be stopped, not only expired: the host would wait for it to be renewed.
   void check_leases(const Daemon& daemon) {
@@ -289,6 +316,8 @@ class SimulatedCluster {
       if (&led.lease->member() != member.get() && led.lease->state() != server::SceneLease::State::kStopped &&
           fault_.empty())
         fault_ = absl::StrCat("the lease of scene ", scene, " outlives its member");
+    if (daemon.leadership_->drained() && !daemon.led_.empty() && fault_.empty())
+      fault_ = absl::StrCat("daemon ", daemon.number_, " leads although it has drained");
   }
   void check_marked(server::MemberId id) {
     if (up_since(last_beats_[id]) < options_.timing.silence && fault_.empty())
@@ -310,7 +339,13 @@ class SimulatedCluster {
   std::vector<std::pair<Time, Time>> outages_;
   Time engine_free_at_ = Time::min();
   std::map<server::MemberId, Time> last_beats_;  // that the engine has executed
-  std::set<server::MemberId> hand_overs_;        // members that may hand scenes over
+  // What a daemon was told, by its number; it stays when the daemon is killed, because statements may be late.
+  struct Permission {
+    bool drains = false;
+    std::multiset<std::pair<SceneKey, server::MemberId>> moves;  // to this member
+  };
+  std::map<uint64_t, Permission> permissions_;
+  std::map<server::MemberId, uint64_t> owners_;  // numbers of the daemons whose members these are
   uint64_t calls_[3] = {};
   std::string fault_;
 };
@@ -357,7 +392,7 @@ inline void SimulatedCluster::Daemon::stop_leading(SceneKey scene, server::Token
 }
 
 inline CallFate SimulatedCluster::Daemon::judge(CallKind) {
-  if (may_hand_over_) cluster_.hand_overs_.insert(membership_->self().id);
+  if (const server::MemberId id = membership_->self().id; id != 0) cluster_.owners_[id] = number_;
   if (cluster_.local_ < std::max(away_until_, cluster_.away_until_)) return CallFate::kNever;
   const Options& options = cluster_.options_;
   const double draw = cluster_.random_.unit();

@@ -299,6 +299,14 @@ TEST_F(LeadershipTest, AMoveToNoMemberIsRefusedAndChangesNothing) {
   EXPECT_THAT(daemons_[0]->stops, IsEmpty());
 }
 
+TEST_F(LeadershipTest, AMoveToTheLeaderItselfChangesNothing) {
+  create_at(*daemons_[0], 1);
+  follow(*daemons_[0], 1);  // as a host might say of its own scene
+  EXPECT_EQ(move(*daemons_[0], 1, daemons_[0]->id()), absl::OkStatus());
+  EXPECT_EQ(cluster_.engine().row(1).token, 1u);
+  EXPECT_THAT(daemons_[0]->stops, IsEmpty());
+}
+
 TEST_F(LeadershipTest, AMoveWhileTheEngineIsAwayIsRefusedAndChangesNothing) {
   create_at(*daemons_[0], 1);
   follow(*daemons_[1], 1);
