@@ -291,9 +291,9 @@ absl::StatusOr<MeshPtr> Registry::add_mesh(const std::string& name, MeshPtr mesh
     if (content) log_->store_topology(mesh->sha256(), encode_topology(mesh->tree().topology()));
   }
   const MutexLock lock(mutex_);
-  meshes_.emplace(name, mesh);
-  add_to_creator(*mesh);
-  return mesh;
+  const auto [known, added] = meshes_.emplace(name, mesh);  // in a cluster, a reader may have added it meanwhile
+  if (added) add_to_creator(*mesh);
+  return known->second;
 }
 
 uint32_t Registry::count_uses(const StaticMesh* mesh) const {
@@ -364,8 +364,8 @@ absl::Status Registry::delete_taken(const std::string& name, MeshPtr taken) {
   if (status.ok()) mesh_graces_.erase(name);
   if (taken == nullptr && status.ok()) damaged_meshes_.erase(name);
   if (taken == nullptr || status.ok()) return status;
-  add_to_creator(*taken);
-  meshes_.emplace(name, std::move(taken));
+  const auto [known, added] = meshes_.emplace(name, std::move(taken));
+  if (added) add_to_creator(*known->second);
   return status;
 }
 
@@ -434,15 +434,10 @@ void Registry::restore_damaged_mesh(const std::string& name, const absl::Status&
   damaged_meshes_.emplace(name, damage);
 }
 
-void Registry::drop_scene(const std::string& name) {
-  ScenePtr dropped;  // freed after the lock is released, because freeing takes long
+void Registry::drop_damaged_scene(const std::string& name, SceneKey key) {
   const MutexLock lock(mutex_);
-  damaged_scenes_.erase(name);
-  const auto known = scenes_.find(name);
-  if (known == scenes_.end()) return;
-  dropped = known->second;
-  take_from_creator(*dropped);
-  scenes_.erase(known);
+  const auto known = damaged_scenes_.find(name);
+  if (known != damaged_scenes_.end() && known->second.key == key) damaged_scenes_.erase(known);
 }
 
 void Registry::drop_mesh(const std::string& name) {

@@ -144,9 +144,11 @@ class Registry {
   void restore_damaged_scene(const std::string& name, SceneKey key, const absl::Status& damage) LOCUS_EXCLUDES(mutex_);
   void restore_damaged_mesh(const std::string& name, const absl::Status& damage) LOCUS_EXCLUDES(mutex_);
 
-  // Forget a scene or mesh, damaged or not, which stays in the log: another server of a cluster leads the scene, or has
-  // deleted or replaced the mesh. Do nothing if there is none. Close the scene before; the mesh must not be in use.
-  void drop_scene(const std::string& name) LOCUS_EXCLUDES(mutex_);
+  // Forget a scene, a damaged scene or a mesh, damaged or not, which stays in the log: another server of a cluster
+  // leads the scene, or has deleted or replaced the mesh. Do nothing if it is not registered. Close the scene before;
+  // the mesh must not be in use.
+  void drop_scene(const ScenePtr& scene) LOCUS_EXCLUDES(mutex_) { unregister(*scene); }
+  void drop_damaged_scene(const std::string& name, SceneKey key) LOCUS_EXCLUDES(mutex_);
   void drop_mesh(const std::string& name) LOCUS_EXCLUDES(mutex_);
 
  private:

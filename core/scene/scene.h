@@ -296,6 +296,8 @@ class Scene {
   // Closes the scene: wakes all waiters. Later calls of view() and of the members that change the scene return `why`
   // or, if that is OK because the scene was deleted, NOT_FOUND. The first close() counts.
   void close(const absl::Status& why = absl::OkStatus()) LOCUS_EXCLUDES(mutex_);
+  // Waits until no change is being applied. After close(), no change begins any more, so nothing is appended later.
+  void await_changes() LOCUS_EXCLUDES(writer_mutex_) { const MutexLock lock(writer_mutex_); }
   // Deletes the scene from its log and closes it. If the log fails, returns the log's error, and the scene stays open.
   absl::Status remove() LOCUS_EXCLUDES(writer_mutex_, mutex_);
   // Does the same as remove() if `condition` returns true, and nothing otherwise. `condition` is called while no change

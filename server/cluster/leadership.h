@@ -62,9 +62,9 @@ class Leadership {
   // have noticed the new token first, and then the scene was stopped and begun again.
   bool token_raised(SceneKey scene, Token before, Token now) { return led_.raise(scene, before, now); }
   // Hands a scene over to a follower that has all of its records or, if the scene has none, to any living member; does
-  // nothing if `to` is this member. `done` receives NOT_FOUND if this daemon does not lead the scene, INVALID_ARGUMENT if
-  // `to` is 0, FAILED_PRECONDITION if `to` is not such a member, UNAVAILABLE if the engine did not answer recently, and
-  // ABORTED if the leader changed meanwhile; after the others of these this daemon leads as before, if it did.
+  // nothing if `to` is this member. `done` receives NOT_FOUND if this daemon does not lead the scene, INVALID_ARGUMENT
+  // if `to` is 0, FAILED_PRECONDITION if `to` is not such a member, UNAVAILABLE if the engine did not answer recently,
+  // and ABORTED if the leader changed meanwhile; after the others of these this daemon leads as before, if it did.
   void move(SceneKey scene, MemberId to, MoveDone done) LOCUS_EXCLUDES(mutex_);
   // Ends after the last step(): the moves that wait, and later ones, receive CANCELLED. A move whose outcome was not
   // known yet receives UNAVAILABLE.

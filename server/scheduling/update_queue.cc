@@ -29,10 +29,10 @@ constexpr milliseconds kReaderGrace{1000};
 
 bool coalesces(const Scene& scene) { return scene.spec().overload == OverloadPolicy::kLatestWins; }
 
-// Returns whether the scene's acks wait for the disk. The queue logs the waiting batches of such a scene together,
-// because a sync costs the same for one batch as for many.
+// Returns whether the scene's acks wait for the disk, or for the engine of a cluster. The queue logs the waiting
+// batches of such a scene together, because a sync costs the same for one batch as for many.
 bool waits_for_disk(const Scene& scene) {
-  return scene.log_key() != 0 && scene.spec().durability == Durability::kLocal;
+  return scene.log_key() != 0 && scene.spec().durability != Durability::kMemory;
 }
 
 absl::StatusOr<Scene::Acks> apply_all(Scene& scene, absl::Span<const UpdateBatch* const> batches) {

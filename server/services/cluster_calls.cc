@@ -73,6 +73,10 @@ absl::Status list_in_cluster(const Caller& caller, Host& host, const v1::ListSce
       if (caller.may(Right::kRead, row.name)) {
         const absl::StatusOr<ScenePtr> local = host.registry.find_scene(row.name);
         v1::Scene scene = local.ok() ? describe(host, caller, **local) : describe_row(host, row);
+        if (absl::IsDataLoss(local.status())) {
+          scene.set_state(v1::SCENE_STATE_DAMAGED);
+          scene.set_last_build_error(std::string(local.status().message()));
+        }
         if (has_labels(scene, request.labels())) {
           if (static_cast<size_t>(response.scenes_size()) == page_size) {
             response.set_next_page_token(response.scenes(response.scenes_size() - 1).name());

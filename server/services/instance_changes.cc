@@ -164,9 +164,14 @@ absl::Status change_instances(Host& host, const Caller& caller, const v1::Change
   if (host.cluster_meshes != nullptr) RETURN_IF_ERROR(host.cluster_meshes->claim(**scene, owned->change));
   const auto outcome = std::make_shared<Outcome>();
   const uint64_t epoch = (*scene)->latest()->epoch;
-  ASSIGN_OR_RETURN(const uint64_t number, submit(host, scene, epoch, owned, std::move(room), outcome));
+  const absl::StatusOr<uint64_t> number = submit(host, scene, epoch, owned, std::move(room), outcome);
+  if (!number.ok() && host.cluster_meshes != nullptr) {
+    owned->meshes.reset();
+    host.cluster_meshes->release_unused(**scene);
+  }
+  RETURN_IF_ERROR(number.status());
   v1::ChangeInstancesResponse response;
-  response.set_change(number);
+  response.set_change(*number);
   response.set_epoch(epoch);
   if (request.no_wait()) {
     for (const v1::Placement& placement : owned->request.place()) response.mutable_ids()->MergeFrom(placement.ids());

@@ -7,6 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "server/host/host.h"
 #include "server/observability/log.h"
+#include "server/services/cluster/cluster_scenes.h"
 #include "server/services/server_events.h"
 
 namespace locus::server {
@@ -16,7 +17,7 @@ void Host::start_lifetimes() {
     idle_scenes.watch(scene);
     leases.watch(scene);
   }
-  mesh_collector.start();
+  if (cluster == nullptr) mesh_collector.start();
   lifetimes.start();
   lease_ends.start();
 }
@@ -29,6 +30,7 @@ void Host::report_idle_scene(const ScenePtr& scene, const absl::Status& status) 
                        {{"scene", name}, {"why", std::string(status.message())}});
   changes.forget(scene->latest()->epoch);
   leases.forget(*scene);
+  if (cluster != nullptr) cluster->deleted(*scene);
   server::log(LogLevel::kInfo, "idle scene deleted", {{"scene", name}});
 }
 

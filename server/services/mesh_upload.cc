@@ -241,11 +241,8 @@ absl::Status receive_mesh(Host& host, const Caller& caller, MessageStream& strea
   if (!more) return malformed_upload("", "an upload needs at least one message, which announces the mesh");
   ASSIGN_OR_RETURN(MeshUpload upload, MeshUpload::begin(message));
   caller.set_subject(upload.name());
-  // In a cluster, the name may belong to a mesh that this server has not read.
-  if (host.cluster_meshes != nullptr) {
-    const absl::Status read = host.cluster_meshes->refresh(upload.name(), "mesh").status();
-    if (absl::IsUnavailable(read)) return read;
-  }
+  // In a cluster, this server may have read another mesh of the name, which was deleted since.
+  if (host.cluster_meshes != nullptr) RETURN_IF_ERROR(host.cluster_meshes->forget_stale(upload.name()));
   ASSIGN_OR_RETURN(const bool answered, answer_early(host, caller, upload, response));
   if (answered) return absl::OkStatus();
   const uint64_t columns = upload_cost(message.vertex_count(), message.triangle_count()) + parts_cost(upload.parts());

@@ -106,7 +106,7 @@ absl::Status QueryWork::take_quotas() const {
 // changed.
 void QueryWork::answer(absl::Status status) {
   drop();
-  if (is_step_ && absl::IsUnavailable(status))
+  if (is_step_ && absl::IsUnavailable(status) && host_.drain.draining())
     status = absl::DeadlineExceededError(
         "the server is shutting down before it answered the queries of the step; the update was applied");
   slot_.answered(std::move(status));
@@ -139,10 +139,10 @@ void QueryWork::look() {
 // Checks the lease of the scene's leader after the revision was pinned: an update that another leader acknowledges
 // later is later than this answer.
 absl::Status QueryWork::check_age() {
-  age_ms_ = host_.cluster == nullptr ? 0 : host_.cluster->age_ms(*scene_);
-  const v1::View& wanted = message_->view();
-  const bool too_old = wanted.max_age_ms() != 0 && age_ms_ > wanted.max_age_ms();
-  return age_ms_ != 0 && (too_old || wanted.leader_only()) ? host_.cluster->check_leads(*scene_) : absl::OkStatus();
+  age_ms_ = 0;
+  if (host_.cluster == nullptr) return absl::OkStatus();
+  ASSIGN_OR_RETURN(age_ms_, host_.cluster->check_view(*scene_, message_->view()));
+  return absl::OkStatus();
 }
 
 // Returns the error for a query batch that stops waiting for its revision, because the call has ended or because the

@@ -33,7 +33,7 @@ absl::StatusOr<ScenePtr> find_scene(const Host& host, const Caller& caller, cons
   }
   absl::StatusOr<ScenePtr> scene = host.registry.find_scene(name);
   if (host.cluster == nullptr || !absl::IsNotFound(scene.status())) return scene;
-  return look_up == LookUp::kMayWait ? host.cluster->wait_for(name) : host.cluster->missing(name);
+  return look_up == LookUp::kMayWait ? host.cluster->wait_for(name, caller.deadline()) : host.cluster->missing(name);
 }
 
 absl::StatusOr<UsedScene> use_scene(const Host& host, const Caller& caller, const std::string& name,

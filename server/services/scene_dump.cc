@@ -223,7 +223,7 @@ absl::Status dump_scene(Host& host, const Caller& caller, const v1::DumpSceneReq
   ASSIGN_OR_RETURN(const UsedScene scene, use_scene(host, caller, request.scene(), "scene", LookUp::kMayWait));
   RETURN_IF_ERROR(check_work(caller));
   ASSIGN_OR_RETURN(SnapshotPin snapshot, wait_for(*scene, to_view(request.view()), caller.wait_until(false), caller));
-  if (request.view().leader_only() && host.cluster != nullptr) RETURN_IF_ERROR(host.cluster->check_leads(*scene));
+  if (host.cluster != nullptr) RETURN_IF_ERROR(host.cluster->check_view(*scene, request.view()).status());
   ASSIGN_OR_RETURN(const CallMemory claim, claim_copy(caller, dump_cost(*snapshot)));
   // A caller that reads slowly could keep the snapshot pinned without a time limit. Therefore the call is cancelled
   // when the pin is revoked.

@@ -15,6 +15,7 @@
 #include "server/host/epoch.h"
 #include "server/observability/log.h"
 #include "server/rpc/call.h"
+#include "server/services/cluster/cluster_meshes.h"
 #include "server/services/cluster/cluster_scenes.h"
 #include "server/services/cluster_calls.h"
 #include "server/services/creator_quotas.h"
@@ -190,6 +191,16 @@ absl::StatusOr<Registry::CreatedScene> add_scene(Host& host, const v1::CreateSce
                                     request.if_absent());
 }
 
+// Takes the quotas of a new scene. Counts the scenes of this server, which is where a scene of a cluster is created,
+// but not always where it is placed.
+absl::StatusOr<std::vector<QuotaHold>> hold_in_cluster(Host& host, const std::string& name, const SceneSpec& spec) {
+  const size_t scenes = host.registry.scene_count();
+  if (host.registry.find_scene(name).ok()) return std::vector<QuotaHold>();
+  if (scenes >= host.config.max_scenes)
+    return refuse_full("name", "scenes", host.config.max_scenes, static_cast<double>(scenes + 1), 0);
+  return hold_scene(host, spec);
+}
+
 // Returns UNIMPLEMENTED if this server does not store scenes as `spec` asks.
 absl::Status check_durability(const Host& host, const v1::SceneSpec& spec) {
   const bool local = spec.durability() == v1::DURABILITY_LOCAL;
@@ -207,6 +218,8 @@ absl::Status create_scene(const Caller& caller, Host& host, const v1::CreateScen
   ASSIGN_OR_RETURN(SceneSpec spec, to_spec(request.spec()));
   RETURN_IF_ERROR(check_durability(host, request.spec()));
   if (request.spec().followers() > 0) return not_served("spec.followers");
+  // Any member could delete a mesh, but only members with scenes that use it know since when it is not used.
+  if (host.cluster != nullptr && spec.mesh_grace_s > 0) return not_served("spec.mesh_grace_s");
   if (host.cluster != nullptr && spec.durability == Durability::kLocal) spec.durability = Durability::kReplicated;
   spec.pinned_bytes = host.pinned_limit();
   spec.creator = creator_name(caller);
@@ -217,7 +230,10 @@ absl::Status create_scene(const Caller& caller, Host& host, const v1::CreateScen
     if (const absl::StatusOr<ScenePtr> found = host.registry.find_scene(static_from); found.ok())
       source = UsedScene(*found);
   }
-  if (host.cluster != nullptr) return create_in_cluster(caller, host, request, spec, response);
+  if (host.cluster != nullptr) {
+    ASSIGN_OR_RETURN(const std::vector<QuotaHold> quotas, hold_in_cluster(host, request.name(), spec));
+    return create_in_cluster(caller, host, request, spec, response);
+  }
   ASSIGN_OR_RETURN(const Registry::CreatedScene created, add_scene(host, request, spec));
   const UsedScene use(created.scene);
   if (!created.existed) {
@@ -274,6 +290,7 @@ absl::Status update_scene(const Caller& caller, Host& host, const v1::UpdateScen
   RETURN_IF_ERROR(check_work(caller));
   ASSIGN_OR_RETURN(const SettingsChange change, to_settings(request));
   ASSIGN_OR_RETURN(const SceneSettings settings, scene->change_settings(change));
+  if (host.cluster != nullptr && scene->log_key() == 0) RETURN_IF_ERROR(host.cluster->store_settings(*scene));
   response.set_cell_size(settings.cell_size);
   response.mutable_labels()->insert(settings.labels.begin(), settings.labels.end());
   log(LogLevel::kInfo, "scene updated", {{"scene", request.name()}, {"fields", absl::StrJoin(request.fields(), ",")}});
@@ -283,11 +300,12 @@ absl::Status update_scene(const Caller& caller, Host& host, const v1::UpdateScen
 absl::Status delete_mesh(const Caller& caller, Host& host, const v1::DeleteMeshRequest& request) {
   RETURN_IF_ERROR(check_mesh_name(request.mesh(), "mesh"));
   caller.set_subject(request.mesh());
+  // In a cluster, this server need not have read the mesh, or has read another one of the name.
+  if (host.cluster_meshes != nullptr) RETURN_IF_ERROR(host.cluster_meshes->forget_stale(request.mesh()));
   absl::Status deleted = host.registry.delete_mesh(request.mesh());
-  // In a cluster, this server need not have read the mesh.
-  if (absl::IsNotFound(deleted) && host.cluster != nullptr) {
-    RETURN_IF_ERROR(find_mesh(host, request.mesh()).status());
-    deleted = host.registry.delete_mesh(request.mesh());
+  if (host.cluster != nullptr && absl::IsNotFound(deleted)) {
+    const absl::Status in_engine = host.log->delete_mesh(request.mesh());
+    if (!absl::IsNotFound(in_engine)) deleted = in_engine;
   }
   RETURN_IF_ERROR(deleted);
   log(LogLevel::kInfo, "mesh deleted", {{"mesh", request.mesh()}});

@@ -134,7 +134,9 @@ struct Server::Parts {
   }
 
   ~Parts() {
-    if (storage != nullptr) storage->notices->deliver_to({});
+    if (storage == nullptr) return;
+    storage->notices->deliver_to({});
+    cluster->end();
   }
 
   // Makes the server a member of a cluster, which does not begin to lead yet.
@@ -151,6 +153,11 @@ struct Server::Parts {
 
   // Declared first and so destroyed last, because work that ends while `host` is destroyed may post to the loops.
   std::unique_ptr<IoThreads> io;
+  // The part in a cluster; null without one. Destroyed after `host`, whose last jobs use it; ~Parts() ends its threads,
+  // which use `host`.
+  ClusterStorage* storage = nullptr;
+  std::unique_ptr<ClusterMeshes> meshes;
+  std::unique_ptr<ClusterScenes> cluster;
   Host host;
   std::unique_ptr<Access> access;
   Scrape scrape;
@@ -161,10 +168,6 @@ struct Server::Parts {
   std::unique_ptr<Connections> connections;  // destroyed after the gRPC server, which reads from them
   std::unique_ptr<grpc::Server> grpc;
   std::unique_ptr<HttpServer> http;  // started before the first call is served, ended after the last call
-  // The part in a cluster; null without one. Declared after `host`, which it uses.
-  ClusterStorage* storage = nullptr;
-  std::unique_ptr<ClusterMeshes> meshes;
-  std::unique_ptr<ClusterScenes> cluster;
   bool ended = false;
 };
 
@@ -237,12 +240,13 @@ void Server::reload() {
 }
 
 void Server::drain(milliseconds grace, const std::function<void()>& before_closing) {
-  const steady_clock::time_point deadline = steady_clock::now() + grace;
   Host& host = parts_->host;
   // Accept new connections until all calls have ended or `deadline` has passed, so that probes get NOT_SERVING.
   parts_->health_service.not_serving();
   // Calls are served until the scenes are handed over.
-  if (parts_->cluster != nullptr) parts_->cluster->drain(std::max(deadline, steady_clock::now() + kHandOverWait));
+  if (parts_->cluster != nullptr)
+    parts_->cluster->drain(steady_clock::now() + std::max<milliseconds>(grace, kHandOverWait));
+  const steady_clock::time_point deadline = steady_clock::now() + grace;
   host.drain.begin();
   host.lifetimes.stop();
   host.lease_ends.stop();

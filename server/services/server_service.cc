@@ -25,6 +25,7 @@ namespace {
 bool serves(const Host& host, absl::string_view feature) {
   if (feature == kBackupFeature) return can_back_up(host);
   if (feature == "durability_replicated") return host.cluster != nullptr;
+  if (feature == "mesh_grace") return host.cluster == nullptr;
   return feature != "durability_local" || (host.log != nullptr && host.cluster == nullptr);
 }
 

@@ -119,9 +119,10 @@ class PostgresLog final : public UpdateLog {
 
   absl::StatusOr<SceneKey> create_scene(absl::string_view name, absl::string_view spec, uint64_t epoch,
                                         ChunkSource state) override LOCUS_EXCLUDES(mutex_);
-  // Like create_scene(), but the scene has no leader and the token 0, and this daemon does not lead it.
+  // Like create_scene(), but the scene has no leader and the token 0, and this daemon does not lead it. Claims the
+  // meshes that the state uses in the same transaction; NOT_FOUND, naming the mesh, if one is not stored.
   absl::StatusOr<SceneKey> create_unled_scene(absl::string_view name, absl::string_view spec, uint64_t epoch,
-                                              ChunkSource state);
+                                              ChunkSource state, absl::Span<const MeshUse> uses = {});
   absl::Status delete_scene(SceneKey scene) override LOCUS_EXCLUDES(mutex_);
   absl::Status restart_scene(SceneKey scene, uint64_t epoch) override LOCUS_EXCLUDES(mutex_);
   absl::Status set_scene_spec(SceneKey scene, absl::string_view spec) override LOCUS_EXCLUDES(mutex_);
@@ -241,8 +242,11 @@ class PostgresLog final : public UpdateLog {
   // Locks the row of the scene's log in the open transaction and checks that this daemon leads the scene. Otherwise
   // returns ABORTED and sets `fenced`, which holds if transact() returns ABORTED, too.
   absl::Status guard(EngineConnection& connection, Led& led, bool& fenced) const LOCUS_REQUIRES(led.writing);
-  // Stores a new scene, whose key is set in `row`.
-  absl::Status store_scene(StoredSceneRow& row, uint64_t leader, uint64_t token, ChunkSource state) const;
+  // Stores a new scene, whose key is set in `row`, and claims its meshes.
+  absl::Status store_scene(StoredSceneRow& row, uint64_t leader, uint64_t token, ChunkSource state,
+                           absl::Span<const MeshUse> uses) const;
+  // Claims the meshes of a new scene in the open transaction.
+  absl::Status insert_uses(EngineConnection& connection, SceneKey scene, absl::Span<const MeshUse> uses) const;
   absl::Status send_row(EngineConnection& connection, const StoredSceneRow& row) const;
   // Changes the row of a scene that this daemon leads.
   absl::Status change_row(SceneKey scene, absl::FunctionRef<void(StoredSceneRow&)> change) LOCUS_EXCLUDES(mutex_);

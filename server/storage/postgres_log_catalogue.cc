@@ -193,7 +193,7 @@ absl::StatusOr<SceneKey> PostgresLog::create_scene(absl::string_view name, absl:
   row.name = std::string(name);
   row.spec = std::string(spec);
   row.epoch = epoch;
-  RETURN_IF_ERROR(store_scene(row, options_.member, 1, state));
+  RETURN_IF_ERROR(store_scene(row, options_.member, 1, state, {}));
   StoredScene stored;
   stored.key = row.key;
   stored.name = row.name;
@@ -203,16 +203,17 @@ absl::StatusOr<SceneKey> PostgresLog::create_scene(absl::string_view name, absl:
 }
 
 absl::StatusOr<SceneKey> PostgresLog::create_unled_scene(absl::string_view name, absl::string_view spec, uint64_t epoch,
-                                                         ChunkSource state) {
+                                                         ChunkSource state, absl::Span<const MeshUse> uses) {
   StoredSceneRow row;
   row.name = std::string(name);
   row.spec = std::string(spec);
   row.epoch = epoch;
-  RETURN_IF_ERROR(store_scene(row, 0, 0, state));
+  RETURN_IF_ERROR(store_scene(row, 0, 0, state, uses));
   return row.key;
 }
 
-absl::Status PostgresLog::store_scene(StoredSceneRow& row, uint64_t leader, uint64_t token, ChunkSource state) const {
+absl::Status PostgresLog::store_scene(StoredSceneRow& row, uint64_t leader, uint64_t token, ChunkSource state,
+                                      absl::Span<const MeshUse> uses) const {
   row.apply_version = options_.apply_version;
   row.snapshot = random_id();
   // Adds a row without a summary of the snapshot, which send_row() then completes. Returns its key; nullopt if the name
@@ -238,6 +239,7 @@ absl::Status PostgresLog::store_scene(StoredSceneRow& row, uint64_t leader, uint
         "INSERT INTO locus.scene_log (scene, leader, token, last, chain)"
         " VALUES ($1::bigint, $2::bigint, $3::bigint, 0, $4::bigint)",
         SqlParameters().number(row.key).number(leader).number(token).number(row.snapshot_chain));
+    RETURN_IF_ERROR(insert_uses(connection, row.key, uses));
     return send_row(connection, row);
   };
   const auto was_done = [&](EngineConnection& connection) -> absl::StatusOr<bool> {

@@ -43,6 +43,23 @@ absl::StatusOr<std::map<std::string, uint64_t>> read_uses(EngineConnection& conn
 
 }  // namespace
 
+absl::Status PostgresLog::insert_uses(EngineConnection& connection, SceneKey scene,
+                                      absl::Span<const MeshUse> uses) const {
+  if (uses.empty()) return absl::OkStatus();
+  std::vector<absl::string_view> names;
+  std::vector<uint64_t> numbers;
+  for (const MeshUse& use : uses) {
+    names.push_back(use.name);
+    numbers.push_back(use.instances);
+  }
+  RETURN_IF_ERROR(lock_meshes(connection, names, uses, answer_deadline()));
+  connection.add(
+      "INSERT INTO locus.scene_mesh (scene, name, instances)"
+      " SELECT $1::bigint, n.name, n.instances FROM unnest($2::text[], $3::bigint[]) AS n (name, instances)",
+      SqlParameters().number(scene).list_of_texts(names).numbers(numbers));
+  return connection.run(answer_deadline());
+}
+
 absl::Status PostgresLog::claim_meshes(SceneKey scene, absl::Span<const MeshUse> uses) {
   return uses.empty() ? absl::OkStatus() : change_uses(scene, uses, UseChange::kAdd);
 }

@@ -11,8 +11,23 @@
 #include "core/base/status_macros.h"
 #include "core/scene/recovery.h"
 #include "server/observability/log.h"
+#include "server/services/cluster/cluster_scenes.h"
 
 namespace locus::server {
+namespace {
+
+// Time after which a caller tries again when the leadership of a scene has ended.
+constexpr uint32_t kFencedMs = 50;
+
+}  // namespace
+
+absl::Status ClusterMeshes::forget_stale(const std::string& name) {
+  const MutexLock lock(mutex_);
+  ASSIGN_OR_RETURN(const std::optional<StoredMesh> stored, log_.find_stored_mesh(name));
+  const absl::StatusOr<MeshPtr> known = host_.registry.find_mesh(name, "mesh");
+  if (!stored || (known.ok() && (*known)->sha256() != stored->sha256)) host_.registry.drop_mesh(name);
+  return absl::OkStatus();
+}
 
 absl::StatusOr<MeshPtr> ClusterMeshes::refresh(const std::string& name, absl::string_view field) {
   const MutexLock lock(mutex_);
@@ -48,13 +63,16 @@ absl::Status ClusterMeshes::claim(const Scene& scene, const StaticChange& change
   std::vector<MeshUse> claimed;
   for (auto& [name, use] : uses) claimed.push_back(std::move(use));
   const MutexLock lock(claims_mutex_);
-  const absl::Status status = log_.claim_meshes(scene.log_key(), claimed);
-  if (absl::IsAborted(status)) return no_leader("another server has become the leader of the scene", 50);
+  const SceneKey key = host_.cluster->key_of(scene);
+  const absl::Status status = key == 0 ? absl::AbortedError("") : log_.claim_meshes(key, claimed);
+  if (absl::IsAborted(status)) return no_leader("another server has become the leader of the scene", kFencedMs);
   return status;
 }
 
 void ClusterMeshes::release_unused(const Scene& scene) {
   const MutexLock lock(claims_mutex_);
+  const SceneKey key = host_.cluster->key_of(scene);
+  if (key == 0) return;
   absl::flat_hash_set<const StaticMesh*> meshes;
   scene.add_used_meshes(meshes);
   const SnapshotPtr latest = scene.latest();
@@ -63,7 +81,7 @@ void ClusterMeshes::release_unused(const Scene& scene) {
     if (!scene.in_use(mesh)) continue;  // only the history has it
     uses.push_back({mesh->name(), mesh->sha256(), std::max<uint64_t>(1, latest->statics->uses(mesh))});
   }
-  const absl::Status status = log_.set_mesh_uses(scene.log_key(), uses);
+  const absl::Status status = log_.set_mesh_uses(key, uses);
   if (!status.ok() && !absl::IsAborted(status))
     log(LogLevel::kWarning, "the uses of meshes could not be stored; unused ones cannot be deleted yet",
         {{"scene", scene.name()}, {"why", std::string(status.message())}});

@@ -4,6 +4,7 @@
 #include <limits>
 #include <optional>
 #include <random>
+#include <set>
 #include <thread>
 #include <utility>
 
@@ -68,17 +69,49 @@ absl::Status being_read(absl::string_view name) {
 ClusterScenes::ClusterScenes(Host& host, ClusterStorage& storage, const std::string& address)
     : host_(host),
       log_(*storage.log),
+      address_(address),
       engine_hosts_(storage.hosts),
       directory_(*storage.log, *storage.engine),
       member_(*storage.engine, *this, options_of(host, address)),
-      readers_(kReaders, kMaxJobs) {}
+      readers_(std::make_unique<ChangeQueue>(kReaders, kMaxJobs)) {}
 
-ClusterScenes::~ClusterScenes() {
-  ended_ = true;
-  member_.stop();
+void ClusterScenes::start() {
+  started_ = true;
+  member_.start();
 }
 
-void ClusterScenes::start() { member_.start(); }
+void ClusterScenes::end() {
+  ended_ = true;
+  member_.stop();
+  std::unique_ptr<ChangeQueue> readers;  // ends without the lock, which its jobs take
+  {
+    const MutexLock lock(mutex_);
+    readers = std::move(readers_);
+  }
+  readers.reset();
+  const MutexLock lock(mutex_);
+  led_.clear();
+  keys_.clear();
+}
+
+void ClusterScenes::submit(SceneKey key, std::function<void()> job) {
+  const MutexLock lock(mutex_);
+  if (readers_ == nullptr) return;
+  const absl::StatusOr<uint64_t> queued = readers_->submit(key, [job = std::move(job)](uint64_t) { job(); });
+  if (!queued.ok()) log(LogLevel::kError, "too many jobs of a scene wait", {{"scene", absl::StrCat(key)}});
+}
+
+std::pair<SceneKey, ClusterScenes::Led> ClusterScenes::find_led(const std::string& name) const {
+  const MutexLock lock(mutex_);
+  for (const auto& [key, led] : led_)
+    if (led.name == name) return {key, led};
+  return {};
+}
+
+bool ClusterScenes::leads(SceneKey key) const {
+  const MutexLock lock(mutex_);
+  return led_.contains(key);
+}
 
 absl::StatusOr<ClusterScenes::Created> ClusterScenes::create(const std::string& name, const SceneSpec& spec,
                                                              uint64_t epoch, const std::string& static_from,
@@ -88,19 +121,19 @@ absl::StatusOr<ClusterScenes::Created> ClusterScenes::create(const std::string& 
   if (row) return Created{*std::move(row), true};
   std::shared_ptr<const StaticSet> statics = StaticSet::empty();
   if (!static_from.empty()) {
-    const absl::StatusOr<ScenePtr> source = host_.registry.find_scene(static_from);
-    if (!source.ok()) {
-      const absl::Status why = missing(static_from);
-      return absl::IsNotFound(why) ? Registry::no_source(static_from) : why;
-    }
+    const absl::StatusOr<ScenePtr> source = wait_for(static_from);
+    if (absl::IsNotFound(source.status())) return Registry::no_source(static_from);
+    RETURN_IF_ERROR(source.status());
     statics = (*source)->latest()->statics;
   }
+  std::vector<MeshUse> uses;
+  for (const StaticMesh* mesh : statics->meshes()) uses.push_back({mesh->name(), mesh->sha256(), statics->uses(mesh)});
   SceneWriter writer(epoch, spec.winding, std::move(statics), limits::kMaxObjects, spec.history);
   FrozenScene beginning;
   beginning.snapshot = writer.published();
   StateWriter state(std::move(beginning));
-  const absl::StatusOr<SceneKey> key =
-      log_.create_unled_scene(name, encode_spec(spec), epoch, [&state] { return state.next(); });
+  const absl::StatusOr<SceneKey> key = log_.create_unled_scene(
+      name, encode_spec(spec), epoch, [&state] { return state.next(); }, uses);
   if (absl::IsAlreadyExists(key.status())) {  // created by another call meanwhile
     ASSIGN_OR_RETURN(row, directory_.look_up(name));
     if (!row || !if_absent) return exists(name);
@@ -121,12 +154,11 @@ absl::StatusOr<ClusterScenes::Created> ClusterScenes::create(const std::string& 
   return Created{std::move(created), false};
 }
 
-absl::StatusOr<ScenePtr> ClusterScenes::wait_for(const std::string& name) {
-  const steady_clock::time_point until = steady_clock::now() + kWait;
+absl::StatusOr<ScenePtr> ClusterScenes::wait_for(const std::string& name, steady_clock::time_point deadline) {
+  const steady_clock::time_point until = std::min(deadline, steady_clock::now() + kWait);
   while (true) {
     absl::StatusOr<ScenePtr> scene = host_.registry.find_scene(name);
     if (!absl::IsNotFound(scene.status())) return scene;
-    directory_.look_up(name).IgnoreError();
     const absl::Status why = missing(name);
     if (!absl::IsUnavailable(why) || steady_clock::now() >= until) return why;
     std::this_thread::sleep_for(kPoll);
@@ -139,8 +171,9 @@ absl::Status ClusterScenes::missing(const std::string& name) {
 }
 
 absl::Status ClusterScenes::elsewhere(const CatalogueScene& row) {
-  if (row.member != 0 && row.member == member_.id()) {
-    member_.look_soon();  // this caller knows it before this daemon's next beat
+  const MemberId self = member_.id();
+  if (row.member != 0 && row.member == self) {
+    if (!leads(row.key)) member_.look_soon();  // this caller knows it before this daemon's next beat
     return being_read(row.name);
   }
   Refusal refusal;
@@ -148,7 +181,8 @@ absl::Status ClusterScenes::elsewhere(const CatalogueScene& row) {
   refusal.field = "scene";
   refusal.token = row.token;
   if (row.member != 0) refusal.addresses = {directory_.address_of(row.member)};
-  if (row.member == 0 || refusal.addresses.front().empty())
+  // The own address belongs to an earlier run of this daemon, which is not declared dead yet.
+  if (row.member == 0 || refusal.addresses.front().empty() || refusal.addresses.front() == address_)
     return no_leader(absl::StrCat("no server leads the scene '", row.name, "' at present"), kNoLeaderMs);
   return refuse(absl::StatusCode::kFailedPrecondition,
                 absl::StrCat("another server has the scene '", row.name, "'; call ", refusal.addresses.front()),
@@ -156,39 +190,60 @@ absl::Status ClusterScenes::elsewhere(const CatalogueScene& row) {
 }
 
 absl::Status ClusterScenes::remove(const std::string& name) {
-  ScenePtr scene;
-  SceneKey key = 0;
-  Token token = 0;
-  {
-    const MutexLock lock(mutex_);
-    const auto found = std::find_if(led_.begin(), led_.end(), [&](const auto& led) { return led.second.name == name; });
-    if (found != led_.end()) {
-      key = found->first;
-      token = found->second.lease->token();
-      scene = found->second.scene;
-    }
+  const auto [key, led] = find_led(name);
+  if (led.lease == nullptr) {
+    const absl::StatusOr<ScenePtr> found = wait_for(name);
+    return found.ok() || absl::IsDataLoss(found.status()) ? being_read(name) : found.status();
   }
-  if (key == 0) return wait_for(name).status();
-  const bool logged = scene == nullptr || scene->log_key() != 0;
-  RETURN_IF_ERROR(logged ? host_.registry.delete_scene(name) : log_.delete_scene(key));
+  const bool logged = led.scene == nullptr || led.scene->log_key() != 0;
+  absl::Status status = logged ? host_.registry.delete_scene(name) : log_.delete_scene(key);
+  // The leadership has ended meanwhile.
+  if (absl::IsAborted(status) || absl::IsNotFound(status))
+    status = no_leader("the leadership of the scene has ended here", kReadingMs);
+  RETURN_IF_ERROR(status);
   if (!logged) {
-    scene->close();
-    host_.registry.drop_scene(name);
+    led.scene->close();
+    host_.registry.drop_scene(led.scene);
   }
   directory_.forget(name);
-  member_.fenced(key, token);
+  member_.fenced(key, led.lease->token());
   return absl::OkStatus();
+}
+
+void ClusterScenes::deleted(const Scene& scene) {
+  const SceneKey key = key_of(scene);
+  const std::shared_ptr<const SceneLease> lease = lease_of(scene);
+  if (key == 0 || lease == nullptr) return;
+  if (scene.log_key() == 0) {
+    const absl::Status removed = log_.delete_scene(key);
+    if (!removed.ok())
+      log(LogLevel::kWarning, "an idle scene could not be deleted in the engine; it begins anew",
+          {{"scene", scene.name()}, {"why", std::string(removed.message())}});
+  }
+  directory_.forget(scene.name());
+  member_.fenced(key, lease->token());
+}
+
+absl::Status ClusterScenes::store_settings(const Scene& scene) {
+  const SceneKey key = key_of(scene);
+  SceneSpec spec = scene.spec();
+  const SceneSettings settings = scene.settings();
+  spec.labels = settings.labels;
+  spec.cell_size = settings.cell_size;
+  const absl::Status stored = key == 0 ? absl::AbortedError("") : log_.set_scene_spec(key, encode_spec(spec));
+  if (absl::IsAborted(stored)) return no_leader("the leadership of the scene has ended here", kReadingMs);
+  return stored;
 }
 
 absl::StatusOr<v1::MoveSceneResponse> ClusterScenes::move(const std::string& name, const std::string& to,
                                                           steady_clock::time_point deadline) {
-  ASSIGN_OR_RETURN(const ScenePtr scene, host_.registry.find_scene(name));
-  const SceneKey key = key_of(*scene);
-  const std::shared_ptr<const SceneLease> lease = member_.find(key);
-  if (key == 0 || lease == nullptr) return missing(name);
+  const auto [key, led] = find_led(name);
+  if (led.lease == nullptr) return missing(name);
+  const MemberId self = member_.id();
   std::vector<MemberRow> others = directory_.members();
   std::erase_if(others, [&](const MemberRow& row) {
-    return row.id == member_.id() || (to.empty() ? row.load >= kTakesNoScenes : row.info.address != to);
+    return row.id == self || row.info.address == address_ ||
+           (to.empty() ? row.load >= kTakesNoScenes : row.info.address != to);
   });
   if (others.empty()) {
     Refusal refusal;
@@ -201,11 +256,13 @@ absl::StatusOr<v1::MoveSceneResponse> ClusterScenes::move(const std::string& nam
   }
   const auto least = std::min_element(others.begin(), others.end(),
                                       [](const MemberRow& a, const MemberRow& b) { return a.load < b.load; });
-  RETURN_IF_ERROR(member_.move(key, least->id, deadline));
-  directory_.forget(name);
+  absl::Status moved = member_.move(key, least->id, deadline);
+  if (absl::IsAborted(moved) || absl::IsNotFound(moved))
+    moved = no_leader("the leadership of the scene has ended here meanwhile", kReadingMs);
+  RETURN_IF_ERROR(moved);
   v1::MoveSceneResponse response;
   response.set_leader(least->info.address);
-  response.set_token(lease->token() + 1);
+  response.set_token(led.lease->token() + 1);
   return response;
 }
 
@@ -224,8 +281,7 @@ void ClusterScenes::start_leading(const LedScene& scene) {
     leaving_.erase(scene.row.key);
   }
   ++begun_;
-  const absl::StatusOr<uint64_t> queued = readers_.submit(scene.row.key, [this, scene](uint64_t) { read(scene); });
-  if (!queued.ok()) log(LogLevel::kError, "a scene cannot be read", {{"why", std::string(queued.status().message())}});
+  submit(scene.row.key, [this, scene] { read(scene); });
 }
 
 void ClusterScenes::stop_leading(SceneKey key, Token token, StopReason reason) {
@@ -239,14 +295,18 @@ void ClusterScenes::stop_leading(SceneKey key, Token token, StopReason reason) {
     if (stopped.scene != nullptr) {
       keys_.erase(stopped.scene.get());
       stopped.scene->close(no_leader("the leadership of the scene has ended here", kReadingMs));
+      host_.registry.drop_scene(stopped.scene);
     }
-    if (!stopped.name.empty()) host_.registry.drop_scene(stopped.name);
+    if (!stopped.name.empty() && stopped.scene == nullptr) host_.registry.drop_damaged_scene(stopped.name, key);
     if (!stopped.name.empty() && reason == StopReason::kHandedOver) leaving_[key] = stopped.name;
   }
   if (reason == StopReason::kFenced) ++fenced_;
   if (stopped.name.empty()) return;
   directory_.forget(stopped.name);
   if (stopped.scene != nullptr) {
+    // A change that began before the scene was closed may still append. The next leadership of this daemon reads the
+    // scene after it.
+    submit(key, [scene = stopped.scene] { scene->await_changes(); });
     host_.changes.forget(stopped.scene->latest()->epoch);
     host_.idle_scenes.forget(*stopped.scene);
     host_.leases.forget(*stopped.scene);
@@ -273,40 +333,41 @@ void ClusterScenes::leader_changed(const LeaderRow& row) {
   scene.member = row.leader;
   scene.token = row.token;
   scene.last_sequence = row.last_sequence;
-  directory_.store(scene.name, scene);  // callers are told at once
+  directory_.store(scene.name, scene, steady_clock::now());  // callers are told at once
   log(LogLevel::kInfo, "scene has a new leader",
       {{"scene", scene.name}, {"member", absl::StrCat(row.leader)}, {"token", absl::StrCat(row.token)}});
 }
 
 void ClusterScenes::read(const LedScene& led) {
+  const auto current = [&] { return !ended_ && led.lease->state() != SceneLease::State::kStopped; };
+  if (!current()) return;
   const steady_clock::time_point start = steady_clock::now();
-  while (!ended_ && led.lease->state() != SceneLease::State::kStopped) {
-    std::string name;
-    const absl::StatusOr<ScenePtr> scene = read_once(led, name);
-    if (scene.ok() || absl::IsDataLoss(scene.status()) || absl::IsFailedPrecondition(scene.status())) {
-      publish(led, name, scene.ok() ? *scene : nullptr, scene.status());
-      log(scene.ok() ? LogLevel::kInfo : LogLevel::kError, scene.ok() ? "scene is led" : "scene is damaged",
-          {{"scene", name},
-           {"token", absl::StrCat(led.row.token)},
-           {"milliseconds",
-            absl::StrCat(std::chrono::duration_cast<milliseconds>(steady_clock::now() - start).count())},
-           {"why", std::string(scene.status().message())}});
-      return;
-    }
-    if (absl::IsAborted(scene.status()) || absl::IsNotFound(scene.status())) {
-      member_.fenced(led.row.key, led.row.token);
-      return;
-    }
-    log(LogLevel::kWarning, "a scene could not be read; this is tried again",
-        {{"scene", absl::StrCat(led.row.key)}, {"why", std::string(scene.status().message())}});
-    std::this_thread::sleep_for(kReadAgain);
+  std::string name;
+  const absl::StatusOr<ScenePtr> scene = read_once(led, name);
+  if (scene.ok() || (absl::IsDataLoss(scene.status()) && !name.empty())) {
+    publish(led, name, scene.ok() ? *scene : nullptr, scene.status());
+    log(scene.ok() ? LogLevel::kInfo : LogLevel::kError, scene.ok() ? "scene is led" : "scene is damaged",
+        {{"scene", name},
+         {"token", absl::StrCat(led.lease->token())},
+         {"milliseconds", absl::StrCat(std::chrono::duration_cast<milliseconds>(steady_clock::now() - start).count())},
+         {"why", std::string(scene.status().message())}});
+    return;
   }
+  const bool fenced = absl::IsAborted(scene.status()) || absl::IsNotFound(scene.status());
+  if (fenced && member_.fenced(led.row.key, led.lease->token())) return;
+  if (!fenced)
+    log(LogLevel::kWarning, "a scene could not be read; this is tried again",
+        {{"scene", absl::StrCat(led.row.key, name.empty() ? "" : " ", name)},
+         {"why", std::string(scene.status().message())}});
+  // Other scenes are read meanwhile, for which this thread pauses only a moment.
+  std::this_thread::sleep_for(kReadAgain);
+  if (current()) submit(led.row.key, [this, led] { read(led); });
 }
 
 absl::StatusOr<ScenePtr> ClusterScenes::read_once(const LedScene& led, std::string& name) {
-  ASSIGN_OR_RETURN(StoredScene stored, log_.begin_leading(led.row.key, led.row.leader, led.row.token));
+  ASSIGN_OR_RETURN(StoredScene stored, log_.begin_leading(led.row.key, led.row.leader, led.lease->token()));
   name = stored.name;
-  if (!stored.damage.ok()) return stored.damage;
+  RETURN_IF_ERROR(stored.damage);
   ASSIGN_OR_RETURN(SceneSpec spec, decode_spec(stored.spec));
   spec.pinned_bytes = host_.pinned_limit();
   stored.spec = encode_spec(spec);
@@ -315,16 +376,26 @@ absl::StatusOr<ScenePtr> ClusterScenes::read_once(const LedScene& led, std::stri
     stored.epoch = new_epoch();
     RETURN_IF_ERROR(log_.restart_scene(stored.key, stored.epoch));
   }
-  absl::Status engine;  // error of the engine while a mesh was read: then the scene is not damaged
-  const FindMesh find = [&](const MeshKey& key) -> MeshPtr {
-    const absl::StatusOr<MeshPtr> mesh = host_.cluster_meshes->refresh(key.name, "mesh");
-    if (absl::IsUnavailable(mesh.status())) engine = mesh.status();
-    return mesh.ok() && (*mesh)->sha256() == key.sha256 ? *mesh : nullptr;
-  };
-  absl::StatusOr<ScenePtr> scene =
-      recover_scene(log_, stored, find, nullptr, in_memory ? LogUse::kReadOnly : LogUse::kAppend);
-  RETURN_IF_ERROR(engine);
-  return scene;
+  // Meshes are not read while the scene is, because both would need a connection to the engine at once. The scene is
+  // read again when the meshes that were not in memory have been read.
+  std::set<MeshKey> asked;
+  while (true) {
+    std::set<MeshKey> missing;
+    const FindMesh find = [&](const MeshKey& key) -> MeshPtr {
+      MeshPtr mesh = host_.registry.find_stored(key);
+      if (mesh == nullptr && !asked.contains(key)) missing.insert(key);
+      return mesh;
+    };
+    absl::StatusOr<ScenePtr> scene =
+        recover_scene(log_, stored, find, nullptr, in_memory ? LogUse::kReadOnly : LogUse::kAppend);
+    if (missing.empty() || (!scene.ok() && !absl::IsDataLoss(scene.status()))) return scene;
+    for (const MeshKey& key : missing) {
+      const absl::Status read = host_.cluster_meshes->refresh(key.name, "mesh").status();
+      // A mesh that is not stored any more was used by earlier records only; recover_scene() checks that.
+      if (!absl::IsNotFound(read) && !absl::IsDataLoss(read)) RETURN_IF_ERROR(read);
+      asked.insert(key);
+    }
+  }
 }
 
 void ClusterScenes::publish(const LedScene& led, const std::string& name, const ScenePtr& scene,
@@ -362,7 +433,7 @@ std::shared_ptr<const SceneLease> ClusterScenes::lease_of(const Scene& scene) co
 
 uint32_t ClusterScenes::age_ms(const Scene& scene) const {
   const std::shared_ptr<const SceneLease> lease = lease_of(scene);
-  if (lease == nullptr) return std::numeric_limits<uint32_t>::max();
+  if (lease == nullptr || lease->member().expires() == ClusterTime::min()) return std::numeric_limits<uint32_t>::max();
   if (lease->living()) return 0;
   // The last beat that succeeded, at which this daemon led the scene, was sent this long ago.
   const auto age = clock_() - (lease->member().expires() - timing_.lease);
@@ -370,9 +441,10 @@ uint32_t ClusterScenes::age_ms(const Scene& scene) const {
   return static_cast<uint32_t>(std::clamp<int64_t>(whole, 0, std::numeric_limits<uint32_t>::max()));
 }
 
-absl::Status ClusterScenes::check_leads(const Scene& scene) const {
-  const std::shared_ptr<const SceneLease> lease = lease_of(scene);
-  if (lease != nullptr && lease->living()) return absl::OkStatus();
+absl::StatusOr<uint32_t> ClusterScenes::check_view(const Scene& scene, const v1::View& view) const {
+  const uint32_t age = age_ms(scene);
+  const bool too_old = age != 0 && (view.leader_only() || (view.max_age_ms() != 0 && age > view.max_age_ms()));
+  if (!too_old) return age;
   return no_leader(absl::StrCat("this server cannot know whether it still leads the scene '", scene.name(), "'"),
                    kNoLeaderMs);
 }
@@ -381,7 +453,7 @@ v1::ScenePlacement ClusterScenes::placement_of(const Scene& scene) const {
   v1::ScenePlacement placement;
   const std::shared_ptr<const SceneLease> lease = lease_of(scene);
   placement.set_role(lease != nullptr && lease->living() ? v1::SCENE_ROLE_LEADING : v1::SCENE_ROLE_NO_LEADER);
-  placement.set_leader(directory_.address_of(member_.id()));
+  placement.set_leader(address_);
   if (lease != nullptr) placement.set_token(lease->token());
   return placement;
 }
@@ -420,7 +492,7 @@ ClusterScenes::Figures ClusterScenes::figures() const {
 
 void ClusterScenes::write_snapshots(steady_clock::time_point deadline) {
   for (const ScenePtr& scene : host_.registry.list_scenes("", std::numeric_limits<size_t>::max())) {
-    if (steady_clock::now() >= deadline) return;
+    if (steady_clock::now() >= deadline || !member_.engine_answers()) return;
     const LogPosition position = scene->log_position();
     if (scene->log_key() == 0 || position.sequence == position.snapshot_sequence) continue;
     const FrozenScene frozen = scene->freeze();
@@ -432,7 +504,9 @@ void ClusterScenes::write_snapshots(steady_clock::time_point deadline) {
 }
 
 void ClusterScenes::drain(steady_clock::time_point deadline) {
-  write_snapshots(deadline);
+  if (!started_) return;
+  const steady_clock::time_point now = steady_clock::now();
+  write_snapshots(now + (deadline - now) / 2);
   const bool left = member_.drain(deadline);
   log(left ? LogLevel::kInfo : LogLevel::kWarning,
       left ? "left the cluster" : "the scenes could not be handed over in time; others take them over within seconds");

@@ -10,8 +10,10 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/container/flat_hash_map.h"
@@ -19,6 +21,7 @@
 #include "core/base/mutex.h"
 #include "core/scene/registry.h"
 #include "locus/v1/cluster.pb.h"
+#include "locus/v1/view.pb.h"
 #include "server/cluster/cluster_member.h"
 #include "server/host/host.h"
 #include "server/scheduling/change_queue.h"
@@ -42,11 +45,13 @@ class ClusterScenes final : public ClusterHost {
 
   // `host` and `storage` must outlive this object. `address` is where the others reach this daemon.
   ClusterScenes(Host& host, ClusterStorage& storage, const std::string& address);
-  // Ends all threads. The scenes stay this member's: call drain() before.
-  ~ClusterScenes() override;
+  ~ClusterScenes() override { end(); }
 
   // Joins the cluster.
   void start();
+  // Ends all threads but those of the directory, and releases the scenes. The scenes stay this member's: call drain()
+  // before. Later calls return as if this daemon led nothing.
+  void end() LOCUS_EXCLUDES(mutex_);
   // Ends a leadership whose append was refused, because another member leads the scene. Never waits.
   void fenced(SceneKey scene, Token token) { member_.fenced(scene, token); }
   // Leads a scene on with the token by which the log has fenced a lost append. Never waits.
@@ -62,14 +67,19 @@ class ClusterScenes final : public ClusterHost {
   };
   absl::StatusOr<Created> create(const std::string& name, const SceneSpec& spec, uint64_t epoch,
                                  const std::string& static_from, bool if_absent);
-  // Returns the scene once this daemon can answer for it, or why it does not within about a second: ELSEWHERE,
-  // NO_LEADER or NOT_FOUND. Waits for the engine.
-  absl::StatusOr<ScenePtr> wait_for(const std::string& name);
+  // Returns the scene once this daemon can answer for it, or why it does not within about a second, or until
+  // `deadline`: ELSEWHERE, NO_LEADER or NOT_FOUND.
+  absl::StatusOr<ScenePtr> wait_for(const std::string& name, std::chrono::steady_clock::time_point deadline =
+                                                                 std::chrono::steady_clock::time_point::max());
   // Returns why the registry does not have the scene: NOT_FOUND, FAILED_PRECONDITION (ELSEWHERE) or UNAVAILABLE
   // (NO_LEADER). Never waits.
   absl::Status missing(const std::string& name);
   // Deletes a scene that this daemon leads. Waits for the engine.
   absl::Status remove(const std::string& name);
+  // Ends the leadership of a scene that was deleted because it was idle. Waits for the engine if the scene has no log.
+  void deleted(const Scene& scene);
+  // Stores the settings of a scene without a log after they were changed. Waits for the engine.
+  absl::Status store_settings(const Scene& scene);
   // Hands a scene that this daemon leads over to the member of address `to`, or to the less loaded of two others if
   // `to` is empty. Waits until `deadline` at most. See ServerService.MoveScene for the errors.
   absl::StatusOr<v1::MoveSceneResponse> move(const std::string& name, const std::string& to,
@@ -78,9 +88,9 @@ class ClusterScenes final : public ClusterHost {
   // Returns the time in milliseconds for which this daemon may have missed changes of the scene, rounded up; 0 while it
   // leads the scene. Never waits.
   uint32_t age_ms(const Scene& scene) const;
-  // Returns OK if this daemon leads the scene now, so that no other one can have acknowledged a later update; else
-  // NO_LEADER. Never waits.
-  absl::Status check_leads(const Scene& scene) const;
+  // Returns age_ms(), or NO_LEADER if that is more than the view permits. Call it when the revision is pinned: no other
+  // server can have acknowledged a later update then. Never waits.
+  absl::StatusOr<uint32_t> check_view(const Scene& scene, const v1::View& view) const;
 
   // Return what the protocol says of a scene and of the cluster. Never wait.
   v1::ScenePlacement placement_of(const Scene& scene) const;
@@ -88,11 +98,15 @@ class ClusterScenes final : public ClusterHost {
   v1::Cluster describe();
   Figures figures() const;
   // Returns the page of the cluster's scenes after `after`. Waits for the engine.
-  absl::StatusOr<std::vector<CatalogueScene>> list(const std::string& after, size_t limit) const {
+  absl::StatusOr<std::vector<CatalogueScene>> list(const std::string& after, size_t limit) {
+    (void)directory_.members();  // so that the leaders' addresses are known
     return log_.list_catalogued(after, limit);
   }
 
   uint64_t load() override;
+  // Returns the key of a scene that this daemon leads; 0 if it does not lead the scene any more. Never waits.
+  SceneKey key_of(const Scene& scene) const LOCUS_EXCLUDES(mutex_);
+
   void start_leading(const LedScene& scene) override LOCUS_EXCLUDES(mutex_);
   void stop_leading(SceneKey scene, Token token, StopReason reason) override LOCUS_EXCLUDES(mutex_);
   void leader_changed(const LeaderRow& row) override LOCUS_EXCLUDES(mutex_);
@@ -107,7 +121,7 @@ class ClusterScenes final : public ClusterHost {
     ScenePtr scene;    // null until the scene is registered, and if it is damaged
   };
 
-  // Reads a scene and registers it; tries again until that succeeds or the leadership ends.
+  // Reads a scene and registers it; tries again later until that succeeds or the leadership ends.
   void read(const LedScene& led) LOCUS_EXCLUDES(mutex_);
   absl::StatusOr<ScenePtr> read_once(const LedScene& led, std::string& name);
   // Makes a scene visible if this daemon still leads it. A null scene is damaged: see `damage`.
@@ -115,12 +129,17 @@ class ClusterScenes final : public ClusterHost {
       LOCUS_EXCLUDES(mutex_);
   absl::Status elsewhere(const CatalogueScene& row);
   std::shared_ptr<const SceneLease> lease_of(const Scene& scene) const LOCUS_EXCLUDES(mutex_);
-  // Returns the key of a scene that is in the registry; 0 if it is not led any more.
-  SceneKey key_of(const Scene& scene) const LOCUS_EXCLUDES(mutex_);
+  // Returns the scene of this name that this daemon leads, damaged or not; an empty one, without a lease, if there is
+  // none.
+  std::pair<SceneKey, Led> find_led(const std::string& name) const LOCUS_EXCLUDES(mutex_);
+  bool leads(SceneKey key) const LOCUS_EXCLUDES(mutex_);
+  // Runs `job` on a reader's thread, after the earlier jobs of the scene. Does nothing after end().
+  void submit(SceneKey key, std::function<void()> job) LOCUS_EXCLUDES(mutex_);
   void write_snapshots(std::chrono::steady_clock::time_point deadline);
 
   Host& host_;
   PostgresLog& log_;
+  const std::string address_;
   const std::string engine_hosts_;
   const ClusterTiming timing_;
   const ClusterClock clock_ = &time_since_boot;
@@ -133,8 +152,9 @@ class ClusterScenes final : public ClusterHost {
   std::atomic<uint64_t> begun_{0};
   std::atomic<uint64_t> fenced_{0};
   std::atomic<bool> ended_{false};
+  std::atomic<bool> started_{false};
   ClusterMember member_;
-  ChangeQueue readers_;  // last: its jobs use the other members
+  std::unique_ptr<ChangeQueue> readers_ LOCUS_GUARDED_BY(mutex_);  // null after end()
 };
 
 }  // namespace locus::server

@@ -30,16 +30,17 @@ SceneDirectory::~SceneDirectory() {
 }
 
 absl::StatusOr<std::optional<CatalogueScene>> SceneDirectory::look_up(const std::string& name) {
+  const Time asked = steady_clock::now();
   ASSIGN_OR_RETURN(std::optional<CatalogueScene> scene, log_.find_catalogued(name));
   if (scene) refresh_members(scene->member);
-  store(name, scene);
+  store(name, scene, asked);
   return scene;
 }
 
 absl::StatusOr<std::optional<CatalogueScene>> SceneDirectory::known(const std::string& name) {
   const MutexLock lock(mutex_);
   const auto found = entries_.find(name);
-  const bool fresh = found != entries_.end() && steady_clock::now() - found->second.read <= kFresh;
+  const bool fresh = found != entries_.end() && found->second.read + kFresh >= steady_clock::now();
   if (!fresh) ask(name);
   const bool has_leader = found != entries_.end() && found->second.scene && found->second.scene->member != 0;
   if (fresh || has_leader) return found->second.scene;
@@ -48,7 +49,8 @@ absl::StatusOr<std::optional<CatalogueScene>> SceneDirectory::known(const std::s
 
 void SceneDirectory::forget(const std::string& name) {
   const MutexLock lock(mutex_);
-  entries_.erase(name);
+  if (entries_.size() >= kMaxEntries && !entries_.contains(name)) entries_.clear();
+  entries_[name] = {std::nullopt, Time::min(), steady_clock::now()};
 }
 
 void SceneDirectory::ask(const std::string& name) {
@@ -57,11 +59,12 @@ void SceneDirectory::ask(const std::string& name) {
   asked_soon_.notify_all();
 }
 
-void SceneDirectory::store(const std::string& name, const std::optional<CatalogueScene>& scene) {
+void SceneDirectory::store(const std::string& name, const std::optional<CatalogueScene>& scene, Time asked) {
   const MutexLock lock(mutex_);
   if (entries_.size() >= kMaxEntries && !entries_.contains(name)) entries_.clear();
   Entry& entry = entries_[name];
-  entry.read = steady_clock::now();
+  if (asked < entry.forgotten) return;
+  entry.read = asked;
   // An older answer can arrive later; the tokens of one scene only increase.
   const bool older = scene && entry.scene && scene->key == entry.scene->key && scene->token < entry.scene->token;
   if (!older) entry.scene = scene;

@@ -43,8 +43,9 @@ class SceneDirectory {
   // Returns what is known of the scene without waiting: UNAVAILABLE, NO_LEADER, if that is nothing or too old; then the
   // scene is being looked up.
   absl::StatusOr<std::optional<CatalogueScene>> known(const std::string& name) LOCUS_EXCLUDES(mutex_);
-  // Records what another source says of the scene. Older news than what is known has no effect.
-  void store(const std::string& name, const std::optional<CatalogueScene>& scene) LOCUS_EXCLUDES(mutex_);
+  // Records what another source said of the scene at `asked` or later. Older news than what is known has no effect.
+  void store(const std::string& name, const std::optional<CatalogueScene>& scene,
+             std::chrono::steady_clock::time_point asked) LOCUS_EXCLUDES(mutex_);
   // Makes the next known() look the scene up.
   void forget(const std::string& name) LOCUS_EXCLUDES(mutex_);
 
@@ -60,7 +61,8 @@ class SceneDirectory {
   using Time = std::chrono::steady_clock::time_point;
   struct Entry {
     std::optional<CatalogueScene> scene;
-    Time read;
+    Time read;       // min(): not read since forget()
+    Time forgotten;  // answers of questions that were asked before are too old
   };
 
   void run() LOCUS_EXCLUDES(mutex_);

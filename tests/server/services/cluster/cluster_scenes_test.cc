@@ -6,10 +6,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <map>
 #include <memory>
 #include <set>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
@@ -127,6 +129,40 @@ class ClusterScenesTest : public ::testing::Test {
     grpc::ClientContext context;
     set_timeout(context);
     return servers_[at]->stubs().server->MoveScene(&context, request, &response);
+  }
+
+  void upload(size_t at, const std::string& name) {
+    grpc::ClientContext context;
+    set_timeout(context);
+    v1::UploadMeshResponse response;
+    const auto writer = servers_[at]->stubs().scenes->UploadMesh(&context, &response);
+    writer->Write(test::whole_mesh(name));
+    writer->WritesDone();
+    const grpc::Status status = writer->Finish();
+    EXPECT_TRUE(status.ok()) << status.error_message();
+  }
+  grpc::Status change_instances(size_t at, const v1::ChangeInstancesRequest& request) {
+    grpc::ClientContext context;
+    set_timeout(context);
+    v1::ChangeInstancesResponse response;
+    return servers_[at]->stubs().scenes->ChangeInstances(&context, request, &response);
+  }
+  grpc::Status delete_mesh(size_t at, const std::string& name) {
+    v1::DeleteMeshRequest request;
+    request.set_mesh(name);
+    grpc::ClientContext context;
+    set_timeout(context);
+    v1::DeleteMeshResponse response;
+    return servers_[at]->stubs().scenes->DeleteMesh(&context, request, &response);
+  }
+  std::vector<std::string> list_meshes(size_t at) {
+    grpc::ClientContext context;
+    set_timeout(context);
+    v1::ListMeshesResponse response;
+    EXPECT_TRUE(servers_[at]->stubs().scenes->ListMeshes(&context, {}, &response).ok());
+    std::vector<std::string> names;
+    for (const v1::Mesh& mesh : response.meshes()) names.push_back(mesh.name());
+    return names;
   }
 
   std::unique_ptr<PostgresServer> engine_;  // null if PostgreSQL is not installed
@@ -321,6 +357,126 @@ TEST_F(ClusterScenesTest, ASceneInMemoryBeginsAnotherEpochWhenItMoves) {
   EXPECT_NE(after.epoch(), epoch);
   EXPECT_EQ(after.objects(), 0u);
   EXPECT_EQ(after.spec().durability(), v1::DURABILITY_MEMORY);
+}
+
+TEST_F(ClusterScenesTest, QueriesGoOnWhileUpdatesWaitForAnEngineThatIsAway) {
+  create("yard");
+  const size_t leader = leader_of("yard");
+  EXPECT_EQ(update("yard", 1, leader).revision(), 1u);
+  engine_->stop(SIGKILL);
+  std::vector<std::thread> writers;
+  std::atomic<int> ended{0};
+  for (uint64_t i = 0; i < 8; ++i)
+    writers.emplace_back([&, writer = 100 + i] {
+      v1::ApplyUpdatesRequest request;
+      request.set_scene("yard");
+      request.mutable_batch()->set_writer(writer);
+      request.mutable_batch()->set_batch(1);
+      request.mutable_batch()->add_remove_ids(1);
+      grpc::ClientContext context;
+      set_timeout(context);
+      v1::ApplyUpdatesResponse response;
+      EXPECT_FALSE(servers_[leader]->stubs().updates->ApplyUpdates(&context, request, &response).ok())
+          << "acknowledged without an engine";
+      ++ended;
+    });
+  v1::QueryResult result;
+  int answered = 0;
+  while (ended < 8) {
+    grpc::ClientContext context;
+    set_timeout(context, std::chrono::milliseconds(2'000));  // far less than the updates wait
+    v1::QueryRequest request;
+    request.set_scene("yard");
+    v1::QueryResponse response;
+    const grpc::Status status = servers_[leader]->stubs().queries->Query(&context, request, &response);
+    EXPECT_TRUE(status.ok()) << status.error_message();
+    if (!status.ok()) break;
+    ++answered;
+  }
+  for (std::thread& writer : writers) writer.join();
+  EXPECT_GT(answered, 0);
+  engine_->start();
+  EXPECT_EQ(update("yard", 2).revision(), 2u) << "nothing that was refused was applied";
+}
+
+TEST_F(ClusterScenesTest, AMeshIsKnownToEveryServerAndCannotBeDeletedWhileAnyUsesIt) {
+  for (const v1::Durability durability : {v1::DURABILITY_REPLICATED, v1::DURABILITY_MEMORY}) {
+    const std::string name = durability == v1::DURABILITY_MEMORY ? "memory" : "yard";
+    v1::CreateSceneRequest request;
+    request.set_name(name);
+    request.mutable_spec()->set_durability(durability);
+    v1::Scene created;
+    ASSERT_TRUE(create(0, request, created).ok());
+    const size_t leader = leader_of(name);
+    const size_t uploader = (leader + 1) % 3, deleter = (leader + 2) % 3;
+    upload(uploader, "cube");
+    v1::ChangeInstancesRequest change;
+    change.set_scene(name);
+    v1::Placement& place = *change.add_place();
+    place.set_mesh("cube");
+    place.add_ids(5);
+    for (int axis = 0; axis < 3; ++axis) place.add_translations(0);
+    const grpc::Status placed = change_instances(leader, change);
+    ASSERT_TRUE(placed.ok()) << placed.error_message();
+    EXPECT_EQ(reason_of(delete_mesh(deleter, "cube")), v1::REASON_IN_USE);
+    EXPECT_EQ(scene(name).instances(), 1u);
+    EXPECT_EQ(list_meshes(deleter), std::vector<std::string>{"cube"});
+    v1::ChangeInstancesRequest removal;
+    removal.set_scene(name);
+    removal.add_remove_ids(5);
+    ASSERT_TRUE(change_instances(leader, removal).ok());
+    const grpc::Status deleted = delete_mesh(deleter, "cube");
+    EXPECT_TRUE(deleted.ok()) << deleted.error_message();
+    EXPECT_EQ(reason_of(change_instances(leader, change)), v1::REASON_NOT_FOUND) << "not from the leader's memory";
+    EXPECT_EQ(reason_of(delete_mesh(uploader, "cube")), v1::REASON_NOT_FOUND);
+    EXPECT_TRUE(list_meshes(leader).empty());
+  }
+}
+
+TEST_F(ClusterScenesTest, ASceneThatBeginsWithInstancesOfAnotherClaimsItsMeshes) {
+  create("yard");
+  const size_t leader = leader_of("yard");
+  upload(leader, "cube");
+  v1::ChangeInstancesRequest change;
+  change.set_scene("yard");
+  v1::Placement& place = *change.add_place();
+  place.set_mesh("cube");
+  place.add_ids(5);
+  for (int axis = 0; axis < 3; ++axis) place.add_translations(0);
+  ASSERT_TRUE(change_instances(leader, change).ok());
+  v1::CreateSceneRequest copy;
+  copy.set_name("copy");
+  copy.mutable_spec()->set_static_from("yard");
+  v1::Scene created;
+  EXPECT_EQ(reason_of(create((leader + 1) % 3, copy, created)), v1::REASON_ELSEWHERE) << "its instances are elsewhere";
+  const grpc::Status copied = create(leader, copy, created);
+  ASSERT_TRUE(copied.ok()) << copied.error_message();
+  v1::ChangeInstancesRequest removal;
+  removal.set_scene("yard");
+  removal.add_remove_ids(5);
+  ASSERT_TRUE(change_instances(leader, removal).ok());
+  EXPECT_EQ(reason_of(delete_mesh(leader, "cube")), v1::REASON_IN_USE);
+  EXPECT_EQ(scene("copy").instances(), 1u);
+}
+
+TEST_F(ClusterScenesTest, ALabelOfASceneInMemoryStaysWhenItMoves) {
+  v1::CreateSceneRequest request;
+  request.set_name("yard");
+  request.mutable_spec()->set_durability(v1::DURABILITY_MEMORY);
+  v1::Scene created;
+  ASSERT_TRUE(create(0, request, created).ok());
+  const size_t leader = leader_of("yard");
+  v1::UpdateSceneRequest labels;
+  labels.set_name("yard");
+  labels.add_fields("labels");
+  (*labels.mutable_labels())["kind"] = "test";
+  grpc::ClientContext context;
+  set_timeout(context);
+  v1::UpdateSceneResponse updated;
+  ASSERT_TRUE(servers_[leader]->stubs().scenes->UpdateScene(&context, labels, &updated).ok());
+  v1::MoveSceneResponse moved;
+  ASSERT_TRUE(move(leader, "yard", "", moved).ok());
+  EXPECT_EQ(scene("yard").spec().labels().at("kind"), "test");
 }
 
 TEST_F(ClusterScenesTest, DurabilityOnOneMachineIsNotServed) {
