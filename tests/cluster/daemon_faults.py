@@ -23,8 +23,8 @@ STORED_ROWS = {
 
 
 class DaemonFaults:
-    """Actions on Daemons that are a cluster on an engine. `scenes` are those whose leaders and followers are hit. With `recorder`,
-    times in which a scene without a log may be led twice are recorded. `upgraded` is the path of another locusd.
+    """Actions on Daemons that are a cluster on an engine. `scenes` are those whose leaders and followers are hit. With
+    `recorder`, times in which a scene without a log may be led twice are recorded. `upgraded` is the path of another locusd.
     """
 
     def __init__(self, daemons, scenes, recorder=None, upgraded=""):
@@ -185,9 +185,9 @@ class DaemonFaults:
             return None
         table, condition, key, values = row
         self.ask(f"DELETE FROM locus.{table} WHERE {condition}", *key)
-        marks = ", ".join(["%s"] * (len(key) + len(columns)))
-        return lambda: self.ask(f"INSERT INTO locus.{table} ({', '.join((*STORED_ROWS[fault.name][1], *columns))}) VALUES ({marks})",
-                                *key, *values)
+        names_of_columns = (*STORED_ROWS[fault.name][1], *columns)
+        marks = ", ".join(["%s"] * len(names_of_columns))
+        return lambda: self.ask(f"INSERT INTO locus.{table} ({', '.join(names_of_columns)}) VALUES ({marks})", *key, *values)
 
     # The end.
 

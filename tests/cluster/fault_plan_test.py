@@ -10,9 +10,10 @@ import unittest
 sys.dont_write_bytecode = True
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 
+from daemon_faults import DaemonFaults  # noqa: E402
 from engine import hold_port  # noqa: E402
 from engine_faults import EngineFaults  # noqa: E402
-from fault_plan import ENGINE, FAULTS, HOOKS, Fault, Plan, names, run  # noqa: E402
+from fault_plan import DAEMONS, ENGINE, FAULTS, HOOKS, STORED, Fault, Plan, names, run  # noqa: E402
 from keeper import CUT, HUNG, OPEN, Keeper  # noqa: E402
 
 WAIT_SECONDS = 20
@@ -61,6 +62,11 @@ class PlanTest(unittest.TestCase):
 
     def test_each_fault_of_the_engine_has_an_action(self):
         self.assertEqual(set(EngineFaults(None, []).actions()), {name for name, kind in FAULTS.items() if kind.needs == ENGINE})
+
+    def test_each_fault_of_daemons_and_of_stored_rows_has_an_action(self):
+        expected = {name for name, kind in FAULTS.items() if kind.needs in (DAEMONS, STORED)}
+        self.assertEqual(set(DaemonFaults(None, []).actions()), expected - {"upgrade-daemon"})
+        self.assertEqual(set(DaemonFaults(None, [], upgraded="locusd-of-another-version").actions()), expected)
 
 
 class PortTest(unittest.TestCase):

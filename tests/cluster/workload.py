@@ -77,7 +77,8 @@ class Batch:
         self.changes, self.conditional = {}, False
 
     def asked(self):
-        values = {"writer": self.batch.writer, "batch": self.batch.batch, "changes": self.changes, "conditional": self.conditional}
+        values = {"writer": self.batch.writer, "batch": self.batch.batch, "changes": self.changes,
+                  "conditional": self.conditional}
         return {**values, "asked_tick": self.batch.tick} if self.batch.HasField("tick") else values
 
     def insert(self, items):
@@ -103,9 +104,9 @@ class Batch:
 class Client(threading.Thread):
     """One client. It runs until the group is stopped; an error of its own is raised by stop()."""
 
-    def __init__(self, number, group, scenes, seed):
+    def __init__(self, number, group, scene, seed):
         super().__init__(name=f"c{number}", daemon=True)
-        self.group, self.scenes, self.recorder = group, scenes, group.recorder
+        self.group, self.scene, self.recorder = group, scene, group.recorder
         self.random = random.Random(f"{seed} {number}")
         self.caller = Caller(group.addresses)
         self.first_serial, self.serial = number * SERIALS, 0
@@ -119,7 +120,7 @@ class Client(threading.Thread):
     def run(self):
         try:
             while not self.group.stopped.is_set():
-                self.act(self.random.choice(self.scenes))
+                self.act(self.scene)
                 time.sleep(PAUSE_SECONDS)
         except BaseException as error:  # raised again by stop()
             self.error = error
@@ -309,15 +310,15 @@ class Client(threading.Thread):
 
 class Workload:
     """Clients of one test: a context manager that runs them. At its end they are stopped. `scenes` are names with fields of their
-    SceneSpec.
+    SceneSpec. Each client has one scene, so that a scene without a leader does not keep it from others.
     """
 
-    def __init__(self, daemons, scenes, recorder, clients=4, clustered=False):
+    def __init__(self, daemons, scenes, recorder, clients=6, clustered=False):
         self.group, self.scenes = Group(daemons, recorder, clustered), list(scenes)
         self.group.set_up(scenes)
         seed = recorder.history.seed
-        self.clients = [Client(number, self.group, self.scenes, seed) for number in range(clients)]
-        self.last = Client(clients, self.group, self.scenes, seed)  # reads all at the end, in the calling thread
+        self.clients = [Client(number, self.group, self.scenes[number % len(scenes)], seed) for number in range(clients)]
+        self.last = Client(clients, self.group, self.scenes[0], seed)  # reads all at the end, in the calling thread
 
     def __enter__(self):
         for client in self.clients:
