@@ -406,8 +406,9 @@ class EpochCheck:
         highest_read = max(((self.calls[number].revision, number) for number in self.reads), default=(0, None))
         acked = [update for update in self.known + self.unknown if update.epoch == self.epoch]
         last = max([highest_read[0], *(update.latest for update in acked)])
-        first = 1 if self.first else min([*self.applied, *(self.calls[number].revision for number in self.reads)], default=1)
-        gaps, previous, candidates = [], first - 1, self.doubtful + self.ticked
+        # The first revision that is known of a later epoch may be the one that the epoch began with.
+        start = 0 if self.first else min([*self.applied, *(self.calls[number].revision for number in self.reads)], default=0)
+        gaps, previous, candidates = [], start, self.doubtful + self.ticked
         for revision in [*sorted(self.applied), last + 1]:
             # One more than there are candidates is enough to find that they do not suffice.
             room = len(candidates) + 1 - len(gaps)

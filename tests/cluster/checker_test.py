@@ -124,6 +124,8 @@ MEMORY_BROKEN = [
         led(0, 1, 1, {1: A}, 1, "d0"), led(2, 3, 1, {1: B}, 2, "d1", epoch=2), led(4, 5, 2, {1: C}, 1, "d0", process="r")]),
     ("epoch", "an old epoch is read after a newer one was acknowledged", [
         update(0, 1, 1, {1: A}), update(2, 3, 1, {1: B}, epoch=2), read(4, 5, 1, {1: A})]),
+    ("dense", "a revision of a later epoch is missing", [
+        update(0, 1, 1, {1: A}), read(2, 3, 0, {1: None}, epoch=2), update(4, 5, 2, {1: B}, epoch=2)]),
     ("epoch", "a client reads an old epoch after a newer one", [
         led(0, 1, 1, {1: A}, 1, "d0"), led(2, 9, 1, {1: B}, 2, "d1", epoch=2),
         read(3, 4, 1, {1: B}, epoch=2), read(5, 6, 1, {1: A})]),
@@ -215,6 +217,8 @@ MEMORY_CORRECT = [
         led(0, 1, 1, {1: A}, 1, "d0"), led(2, 3, 1, {1: B}, 2, "d1", epoch=2), read(4, 5, 1, {1: B}, epoch=2)]),
     ("an update that is answered late by the new epoch was sent before one of the old epoch", [
         update(0, 1, 1, {1: A}), update(2, 30, 1, {1: B}, epoch=2), update(8, 9, 2, {1: C}), update(31, 32, 2, {1: A}, epoch=2)]),
+    ("a new epoch begins without objects, at revision 0", [
+        update(0, 1, 1, {1: A}), read(2, 3, 0, {1: None}, epoch=2), update(4, 5, 1, {1: B}, epoch=2)]),
     ("the two epochs name no tokens", [
         update(0, 1, 1, {1: A}), update(2, 3, 2, {1: B}), update(4, 5, 1, {1: B}, epoch=2), update(6, 7, 2, {1: C}, epoch=2)]),
     ("a client asks for the old epoch by its revision", [

@@ -8,6 +8,7 @@ drained, started again, and cut off from the engine and from each other; everyth
 
 Each daemon has relays of its own to each node of the engine, under its name (`engine.set_links(HUNG, sources=["d0"])`), and
 one that all other daemons use to reach it, which is the address that it advertises. Clients reach daemons past all relays.
+LOCUS_CLUSTER_LOGS names a folder to which the logs of daemons are copied at the end.
 """
 import contextlib
 import os
@@ -97,6 +98,8 @@ class Daemons:
             if daemon.state != DOWN:
                 self.kill(daemon)
             daemon.holder.close()
+            if os.environ.get("LOCUS_CLUSTER_LOGS") and os.path.exists(daemon.log):
+                shutil.copy(daemon.log, os.environ["LOCUS_CLUSTER_LOGS"])
         if self.caller:
             self.caller.close()
         if self.engine is None:

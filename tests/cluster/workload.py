@@ -112,6 +112,7 @@ class Client(threading.Thread):
         self.first_serial, self.serial = number * SERIALS, 0
         self.leaders, self.tokens = {}, {}   # scene -> name of the daemon, and newest token
         self.seen = {}                       # scene -> (epoch, highest revision)
+        self.sessions = 1                    # reads go back only from one to the next
         self.writers = {}                    # scene -> (writer, number of its last batch)
         self.counts = dict.fromkeys(("acks", "reads", "unknown", "refused", "repeats", "gaps"), 0)
         self.start_time = time.monotonic()
@@ -126,6 +127,10 @@ class Client(threading.Thread):
             self.error = error
         finally:
             self.caller.close()
+
+    @property
+    def session(self):
+        return f"{self.name}.{self.sessions}"
 
     def act(self, scene):
         draw = self.random.random()
@@ -161,7 +166,7 @@ class Client(threading.Thread):
 
     def note_token(self, scene, name, token, begin):
         if token:
-            call = self.recorder.invoke(TOKEN, scene, self.name, begin)
+            call = self.recorder.invoke(TOKEN, scene, self.session, begin)
             self.recorder.end(call, OK, daemon=name, token=token)
 
     def ask_token(self, scene):
@@ -242,7 +247,7 @@ class Client(threading.Thread):
     def update(self, scene, asked, service, rpc, request, decode):
         """Sends an update once, and records the attempt."""
         name = self.target(scene)
-        call = self.recorder.invoke(UPDATE, scene, self.name, **asked)
+        call = self.recorder.invoke(UPDATE, scene, self.session, **asked)
         answer = self.caller.send(name, service, rpc, request)
         if answer.answered:
             self.leaders[scene] = name
@@ -287,12 +292,13 @@ class Client(threading.Thread):
         if leader_only and has_field(view, "leader_only"):
             view.leader_only = True
         name = self.target(scene) if leader_only else self.random.choice(list(self.group.addresses))
-        call = self.recorder.invoke(READ, scene, self.name, **asked)
+        call = self.recorder.invoke(READ, scene, self.session, **asked)
         answer = self.caller.send(name, "Query", "Query", request, READ_SECONDS)
         if not answer.answered:
             self.recorder.end(call, FAILED, daemon=name, error=answer.error)
-            if answer.reason == "REASON_SCENE_RESTARTED":
+            if answer.reason == "REASON_SCENE_RESTARTED":  # a client starts over with the scene
                 self.seen.pop(scene, None)
+                self.sessions += 1
             if answer.code != "OUT_OF_RANGE":
                 self.learn(scene, name, answer, call.begin)
             return False
