@@ -242,7 +242,7 @@ class ClusterTest(unittest.TestCase):
     def test_a_cluster_keeps_its_promises_through_faults(self):
         plan, recorder = plan_of_this_run(), Recorder(SEED, memory_scenes={"brawl"})
         say("\n" + str(plan))
-        specs = {**dict.fromkeys(SCENES, {}), "brawl": MEMORY}
+        specs = {SCENES[0]: {"followers": 1}, SCENES[1]: {}, "brawl": MEMORY}
         with Engine(life_seconds=LIFE_SECONDS) as engine, Daemons(3, engine) as daemons:
             faults = DaemonFaults(daemons, specs, recorder)
             actions = {**EngineFaults(engine, list(daemons.addresses())).actions(), **faults.actions()}

@@ -36,12 +36,21 @@ class Group:
         self.stopped = threading.Event()
 
     def set_up(self, scenes):
-        """Uploads a mesh, and creates scenes: names with fields of their SceneSpec."""
+        """Uploads a mesh, and creates scenes: names with fields of their SceneSpec. Where the daemons serve no followers, scenes
+        have none.
+        """
         with contextlib.closing(Caller(self.addresses)) as caller:
             self.until_done(self.upload)
             for scene, spec in scenes.items():
-                self.until_done(lambda name, scene=scene, spec=spec: self.done(
-                    caller.call(name, "Scene", "CreateScene", seconds=10, name=scene, if_absent=True, spec=spec)))
+                self.until_done(lambda name, scene=scene, spec=spec: self.create(caller, name, scene, spec))
+
+    @staticmethod
+    def create(caller, daemon, scene, spec):
+        answer = caller.call(daemon, "Scene", "CreateScene", seconds=10, name=scene, if_absent=True, spec=spec)
+        if answer.reason == "REASON_NOT_SERVED" and "followers" in spec:
+            rest = {name: value for name, value in spec.items() if name != "followers"}
+            return Group.create(caller, daemon, scene, rest)
+        return "" if answer.answered else answer.error
 
     def upload(self, name):
         try:
@@ -50,10 +59,6 @@ class Group:
         except calls.locus.LocusError as error:
             return str(error)
         return ""
-
-    @staticmethod
-    def done(answer):
-        return "" if answer.answered else answer.error
 
     def until_done(self, act):
         """Calls `act` with one daemon after the other until it returns no error."""
