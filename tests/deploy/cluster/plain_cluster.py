@@ -20,7 +20,7 @@ sys.path.insert(0, os.path.join(SOURCE, "tests/cluster"))
 
 import keeper  # noqa: E402
 import sql  # noqa: E402
-from engine import EngineError, free_port, quick_folder, wait_for  # noqa: E402
+from engine import EngineError, hold_port, quick_folder, wait_for  # noqa: E402
 
 DEPLOY = os.path.join(SOURCE, "deploy/cluster")
 ETCD, PATRONI, HAPROXY, POSTGRES = "/usr/bin/etcd", "/usr/bin/patroni", "/usr/sbin/haproxy", "/usr/lib/postgresql/15/bin/postgres"
@@ -47,10 +47,16 @@ def page(port, path):
 
 
 class Member:
-    """One etcd, or one node of the engine: its ports and its process."""
+    """One etcd, or one node of the engine: its two ports, which are held while it is down, and its process."""
 
-    def __init__(self, name, ports):
-        self.name, self.ports, self.process = name, ports, None
+    def __init__(self, name):
+        self.name, self.process = name, None
+        self.holders = [hold_port(), hold_port()]
+        self.ports = [holder.getsockname()[1] for holder in self.holders]
+
+    def release_ports(self):
+        for holder in self.holders:
+            holder.close()
 
 
 class PlainCluster:
@@ -61,8 +67,9 @@ class PlainCluster:
         self.folder = tempfile.mkdtemp(prefix="locus-plain-cluster-", dir=quick_folder())
         self.keeper.guard_folder(self.folder)
         os.chmod(self.folder, 0o711)
-        self.etcds = [Member(f"etcd-{number}", (free_port(), free_port())) for number in range(1, COUNT + 1)]
-        self.nodes = [Member(f"engine-{number}", (free_port(), free_port())) for number in range(1, COUNT + 1)]
+        self.members, self.processes = [], []
+        self.etcds = [self.member(f"etcd-{number}") for number in range(1, COUNT + 1)]
+        self.nodes = [self.member(f"engine-{number}") for number in range(1, COUNT + 1)]
         try:
             self.prepare()
             for member in self.etcds:
@@ -82,6 +89,14 @@ class PlainCluster:
 
     def close(self):
         self.keeper.close()
+        for process in self.processes:
+            process.wait(timeout=30)
+        for member in self.members:
+            member.release_ports()
+
+    def member(self, name, kind=Member):
+        self.members.append(kind(name))
+        return self.members[-1]
 
     def path(self, *names):
         return os.path.join(self.folder, *names)
@@ -93,9 +108,13 @@ class PlainCluster:
         os.chown(self.path("secrets", "passfile"), os.geteuid(), os.getegid())  # not the user of the image, as this is none
         with open(self.path("secrets", "engine.env"), encoding="utf-8") as file:
             self.secrets = dict(line.rstrip("\n").split("=", 1) for line in file)
-        for name in ("patroni.yml", "create_database.sh"):
-            shutil.copy(os.path.join(DEPLOY, "engine", name), self.path(name))
-            os.chmod(self.path(name), 0o755)
+        shutil.copy(os.path.join(DEPLOY, "engine/create_database.sh"), self.path("create_database.sh"))
+        # Shared memory outside of a node's folder would outlive a node that is killed.
+        parameters = '  parameters:\n    unix_socket_directories: ""\n'
+        with open(os.path.join(DEPLOY, "engine/patroni.yml"), encoding="utf-8") as file:
+            before, _, after = file.read().rpartition(parameters)
+        with open(self.path("patroni.yml"), "w", encoding="utf-8") as file:
+            file.write(before + parameters + "    dynamic_shared_memory_type: mmap\n" + after)
         for member in self.etcds + self.nodes:
             os.mkdir(self.path(member.name), 0o700)
             os.chown(self.path(member.name), self.user.pw_uid, self.user.pw_gid)
@@ -113,10 +132,11 @@ class PlainCluster:
         prefix = ["setpriv", f"--reuid={user.pw_uid}", f"--regid={user.pw_gid}", "--clear-groups", "--"] if user else []
         variables = {"PATH": f"{self.folder}:/usr/bin:/bin:/usr/sbin:/sbin", "LC_ALL": "C.UTF-8", **environment}
         with open(self.path(name + ".log"), "ab") as log:
-            process = subprocess.Popen(["unshare", "--pid", "--fork", "--mount-proc", "--", *prefix, *command], env=variables,
+            process = subprocess.Popen(["unshare", "--pid", "--ipc", "--fork", "--mount-proc", "--", *prefix, *command], env=variables,
                                        cwd=self.path(name) if user else self.folder, stdin=subprocess.DEVNULL, stdout=log,
                                        stderr=log)
         self.keeper.guard(process.pid)
+        self.processes.append(process)
         return process
 
     def log(self, name):
@@ -202,4 +222,4 @@ def seconds_since(start):
     return f"{time.monotonic() - start:.1f} s"
 
 
-__all__ = ["COUNT", "HAPROXY", "PlainCluster", "page", "seconds_since", "unavailable", "wait_for"]
+__all__ = ["COUNT", "DEPLOY", "HAPROXY", "Member", "PlainCluster", "page", "seconds_since", "unavailable", "wait_for"]
