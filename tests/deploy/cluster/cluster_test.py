@@ -1,6 +1,6 @@
-"""Test of deploy/cluster as a whole in plain processes: three locusd on PostgreSQL with Patroni, behind HAProxy. Clients that know
-only the proxy write without pause; a daemon is killed, then the primary, then a daemon is stopped in order. Work goes on, and
-every acknowledged update is there, once.
+"""Test of deploy/cluster as a whole in plain processes: three locusd on PostgreSQL with Patroni, behind HAProxy. Clients that
+know only the proxy write without pause; a daemon is killed, then the primary, then a daemon is stopped in order. Work goes on,
+and every acknowledged update is there, once.
 
     LOCUS_PACKAGE=build/release/python LOCUS_BIN=build/release/bin python3 cluster_test.py
 

@@ -132,9 +132,9 @@ class PlainCluster:
         prefix = ["setpriv", f"--reuid={user.pw_uid}", f"--regid={user.pw_gid}", "--clear-groups", "--"] if user else []
         variables = {"PATH": f"{self.folder}:/usr/bin:/bin:/usr/sbin:/sbin", "LC_ALL": "C.UTF-8", **environment}
         with open(self.path(name + ".log"), "ab") as log:
-            process = subprocess.Popen(["unshare", "--pid", "--ipc", "--fork", "--mount-proc", "--", *prefix, *command], env=variables,
-                                       cwd=self.path(name) if user else self.folder, stdin=subprocess.DEVNULL, stdout=log,
-                                       stderr=log)
+            process = subprocess.Popen(["unshare", "--pid", "--ipc", "--fork", "--mount-proc", "--", *prefix, *command],
+                                       env=variables, cwd=self.path(name) if user else self.folder, stdin=subprocess.DEVNULL,
+                                       stdout=log, stderr=log)
         self.keeper.guard(process.pid)
         self.processes.append(process)
         return process
