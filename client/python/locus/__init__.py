@@ -14,24 +14,26 @@ from .columns import ColumnLike, Values
 from .compounds import Compound
 from .connection import Retry
 from .embedded import EmbeddedClient, embedded
-from .enums import (AtStart, ClipDepth, Column, Cull, Inside, OutsideHistory, OverloadPolicy, Precision, RayMode, Reason,
-                    SceneState, Source, StaticDetail, Winding)
+from .enums import (AtStart, ClipDepth, Column, Cull, Durability, Inside, OutsideHistory, OverloadPolicy, Precision, RayMode,
+                    Reason, SceneRole, SceneState, Source, StaticDetail, Winding)
 from .environment import connect_from_environment
 from .errors import LocusError
 from .meshes import InstanceChange, MeshColumns, PlacedInstances
 from .queries import After, Block, QueryBatch
 from .query_stream import QueryStream
 from .results import NO_TRIANGLE, BlockResult, QueryResult, StepResult
+from .routes import ReadFrom
 from .update_stream import UpdateStream
 from .updates import UpdateBatch
-from .values import Ack, ItemError, Limit, Mesh, MeshPart, Quota, Revision, Scene, Server, Work
+from .values import (Ack, Cluster, Follower, ItemError, Leadership, Limit, Member, Mesh, MeshPart, Placement, Quota, Revision,
+                     Scene, Server, Work)
 
 __all__ = [
-    "Ack", "After", "AtStart", "Block", "BlockResult", "Client", "ClipDepth", "Column", "ColumnLike",
-    "Compound", "Cull", "DEFAULT_ADDRESS", "EmbeddedClient", "Inside",
-    "InstanceChange", "ItemError", "Limit", "LocusError", "Mesh", "MeshColumns", "MeshPart", "NO_TRIANGLE",
-    "OutsideHistory", "OverloadPolicy", "PlacedInstances", "Precision", "QueryBatch", "QueryResult", "QueryStream",
-    "Quota", "RayMode", "Reason", "Retry", "Revision", "Scene", "SceneState", "Server", "Source", "StaticDetail",
-    "StepResult", "UpdateBatch", "UpdateStream", "Values", "Winding", "Work", "connect", "connect_from_environment",
-    "embedded",
+    "Ack", "After", "AtStart", "Block", "BlockResult", "Client", "ClipDepth", "Cluster", "Column", "ColumnLike",
+    "Compound", "Cull", "DEFAULT_ADDRESS", "Durability", "EmbeddedClient", "Follower", "Inside", "InstanceChange",
+    "ItemError", "Leadership", "Limit", "LocusError", "Member", "Mesh", "MeshColumns", "MeshPart", "NO_TRIANGLE",
+    "OutsideHistory", "OverloadPolicy", "PlacedInstances", "Placement", "Precision", "QueryBatch", "QueryResult",
+    "QueryStream", "Quota", "RayMode", "ReadFrom", "Reason", "Retry", "Revision", "Scene", "SceneRole", "SceneState",
+    "Server", "Source", "StaticDetail", "StepResult", "UpdateBatch", "UpdateStream", "Values", "Winding", "Work",
+    "connect", "connect_from_environment", "embedded",
 ]

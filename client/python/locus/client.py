@@ -11,44 +11,63 @@ change nothing are retried within their timeout, as often as `retry` of connect(
 or asks for a wait. apply() is retried only if its batch carries `writer` and `number`. Other calls are never retried,
 with one exception: if the server refuses the token of a unary call, and the token file then contains a new token, the
 call is repeated with the new token.
+
+With several addresses, connect() returns the client of a cluster. It sends each call to the server that leads the scene,
+which other servers name, and goes to the next server when one fails. A call that a server refused because another one
+leads the scene, or because it shuts down, has changed nothing and is repeated, whatever it is. The revisions that a client
+sees of a scene never decrease: queries that name no revision wait for the highest one that it has seen.
 """
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, Dict, Iterator, List, Mapping, Optional, Sequence
+from typing import Any, Dict, Iterator, List, Mapping, Optional, Sequence, Union
 
 import grpc
 
 from . import columns, meshes, schema, wire
+from .cluster import ClusterConnection
 from .connection import Connection, Retry
 from .credentials import Credentials
-from .enums import OverloadPolicy, Winding
-from .errors import LocusError, connection_advice, from_call, late_query, parsed
+from .enums import Durability, OverloadPolicy, Winding
+from .errors import LocusError, late_query, parsed
 from .meshes import InstanceChange, MeshColumns, PlacedInstances
-from .queries import QueryBatch
+from .queries import QueryBatch, names_revision
 from .query_stream import QueryStream
 from .results import QueryResult, StepResult
+from .routes import ReadFrom
 from .update_stream import UpdateStream
 from .updates import UpdateBatch
-from .values import Ack, Mesh, MeshPart, Quota, Scene, Server
+from .values import Ack, Leadership, Mesh, MeshPart, Quota, Scene, Server
 
 DEFAULT_ADDRESS = "127.0.0.1:7575"
 _HEALTH = schema.method("grpc.health.v1.Health", "Check")
 _SERVING = 1
+_TIMEOUT, _CLUSTER_TIMEOUT = 10.0, 30.0
+_RECONNECT = Retry(attempts=10)
+# Long enough for another server of a cluster to take over the scenes of one that was lost, which takes about 8 s.
+_CLUSTER_RETRY = Retry(attempts=45, max_wait=0.5)
 
 
 def _rpc(service: str, name: str) -> schema.Method:
     return schema.method(f"locus.v1.{service}Service", name)
 
 
-def connect(address: str = DEFAULT_ADDRESS, *, timeout: float = 10.0, long_timeout: float = 600.0,
-            wait_for_server: bool = False, max_send_bytes: int = 32 << 20, max_receive_bytes: int = 64 << 20,
-            retry: Retry = Retry(), tls: bool = False, ca: str = "", cert: str = "", key: str = "",
-            server_name: str = "", token: str = "", token_file: str = "",
-            allow_token_without_tls: bool = False) -> "Client":
-    """Connects to a locusd at `host:port`, `host` (port 7575) or `unix:/path`.
+_QUERY = _rpc("Query", "Query")
 
-    `timeout`: maximum duration of a call in seconds, including retries; `long_timeout`: maximum duration, in seconds,
+
+def connect(address: Union[str, Sequence[str]] = DEFAULT_ADDRESS, *, timeout: Optional[float] = None,
+            long_timeout: float = 600.0, wait_for_server: bool = False, max_send_bytes: int = 32 << 20,
+            max_receive_bytes: int = 64 << 20, retry: Optional[Retry] = None, tls: bool = False, ca: str = "",
+            cert: str = "", key: str = "", server_name: str = "", token: str = "", token_file: str = "",
+            allow_token_without_tls: bool = False, read_from: ReadFrom = ReadFrom.LEADER) -> "Client":
+    """Connects to a locusd at `host:port`, `host` (port 7575) or `unix:/path`, or to a cluster.
+
+    For a cluster, give the addresses of some of its servers, separated by commas or as a list; a list may have a single
+    one. The client also connects to servers that these name, with the same credentials. `read_from`: the servers of a
+    cluster that answer queries. connect() succeeds when one of the addresses answers.
+
+    `timeout`: maximum duration of a call in seconds, including retries, by default 10, for a cluster 30; `retry`: policy
+    of retries, by default Retry(), for a cluster one that lasts 20 s, longer than a takeover; `long_timeout`: maximum duration, in seconds,
     of mesh transfers and changes of instances. With `wait_for_server`, connect() retries until `timeout` seconds have
     passed; without it, a refused connection fails immediately with LocusError UNAVAILABLE, which names the address.
     `max_send_bytes`, `max_receive_bytes`: maximum message sizes; the server accepts 32 MiB by default, and an answer
@@ -66,10 +85,24 @@ def connect(address: str = DEFAULT_ADDRESS, *, timeout: float = 10.0, long_timeo
     """
     credentials = Credentials(tls=tls, ca=ca, cert=cert, key=key, server_name=server_name, token=token,
                               token_file=token_file, allow_token_without_tls=allow_token_without_tls)
-    client = Client(Connection(address, timeout=timeout, long_timeout=long_timeout, max_send_bytes=max_send_bytes,
-                               max_receive_bytes=max_receive_bytes, retry=retry, credentials=credentials))
+    several = not isinstance(address, str) or ("," in address and not address.startswith("unix:"))
+    total = timeout if timeout is not None else _CLUSTER_TIMEOUT if several else _TIMEOUT
+    policy = retry if retry is not None else _CLUSTER_RETRY if several else Retry()
+
+    def connection(target: str) -> Connection:
+        return Connection(target, timeout=total, long_timeout=long_timeout, max_send_bytes=max_send_bytes,
+                          max_receive_bytes=max_receive_bytes, retry=policy, credentials=credentials, is_member=several)
+
+    if isinstance(address, str) and not several:
+        client = Client(connection(address))
+    else:
+        addresses = [one.strip() for one in (address.split(",") if isinstance(address, str) else address)]
+        if not addresses:
+            raise ValueError("there is no address: give one or more")
+        client = Client(ClusterConnection(addresses, connection, timeout=total, long_timeout=long_timeout, retry=policy,
+                                read_from=read_from))
     try:
-        client._greet(wait_for_server)
+        client._connection.greet(wait_for_server)
     except BaseException:
         client.close()
         raise
@@ -79,13 +112,13 @@ def connect(address: str = DEFAULT_ADDRESS, *, timeout: float = 10.0, long_timeo
 class Client:
     """Connection returned by connect(). Thread-safe. Use it as a context manager, or call close()."""
 
-    def __init__(self, connection: Connection) -> None:
+    def __init__(self, connection: Union[Connection, ClusterConnection]) -> None:
         self._connection = connection
         self._unary = connection.unary
 
     @property
     def address(self) -> str:
-        """Address of the server, with its port."""
+        """Address of the server, with its port; the given addresses of a cluster, joined by commas."""
         return self._connection.address
 
     def close(self) -> None:
@@ -119,7 +152,8 @@ class Client:
     def create_scene(self, name: str, *, if_absent: bool = False, labels: Optional[Mapping[str, str]] = None,
                      winding: Winding = Winding.UNSPECIFIED, static_from: str = "", history_ticks: int = 0,
                      history_bytes: int = 0, overload: OverloadPolicy = OverloadPolicy.UNSPECIFIED,
-                     idle_ttl_s: int = 0, mesh_grace_s: int = 0, cell_size: float = 0) -> Scene:
+                     idle_ttl_s: int = 0, mesh_grace_s: int = 0, cell_size: float = 0,
+                     durability: Durability = Durability.UNSPECIFIED, followers: int = 0) -> Scene:
         """Creates an empty scene, or one that starts with the instances of `static_from`.
 
         `history_ticks`: number of past ticks that can be queried; `history_bytes`: maximum memory of the history, 0 =
@@ -131,6 +165,9 @@ class Client:
         seconds after no scene uses it any more; 0 = never.
         `cell_size`: edge of the cells of the objects' grid, rounded up to a power of two; 0 = the server chooses it. It
         affects only the cost of queries and updates.
+        `durability`: changes that survive a crash; by default all acknowledged ones in a cluster (REPLICATED) and on a
+        server with a data directory (LOCAL). `followers`: number of servers of a cluster, at most 8, that follow the
+        scene; they answer queries, and take over without reading the scene anew.
         `if_absent`: returns an existing scene of this name unchanged instead of failing with ALREADY_EXISTS.
         """
         rpc = _rpc("Scene", "CreateScene")
@@ -144,7 +181,9 @@ class Client:
         request.spec.idle_ttl_s = idle_ttl_s
         request.spec.mesh_grace_s = mesh_grace_s
         request.spec.cell_size = cell_size
-        return Scene.of(self._unary(rpc, request, scene=name).scene)
+        request.spec.durability = durability
+        request.spec.followers = followers
+        return Scene.of(self._unary(rpc, request, scene=name, route=static_from).scene)
 
     def scene(self, name: str) -> Scene:
         """Returns the current description of a scene."""
@@ -175,6 +214,17 @@ class Client:
         """Deletes a scene with its objects and instances; meshes stay."""
         rpc = _rpc("Scene", "DeleteScene")
         self._unary(rpc, rpc.request(name=name, if_present=if_present), scene=name)
+        self._connection.forget(name)
+
+    def move_scene(self, scene: str, to: str = "") -> Leadership:
+        """Moves the leadership of a scene to another server of the cluster. Updates wait for at most about a second.
+
+        `to`: address of the new leader, as in Server.cluster; by default the less loaded of two other servers. Needs the
+        right `admin` to the scene.
+        """
+        rpc = _rpc("Server", "MoveScene")
+        moved = self._unary(rpc, rpc.request(scene=scene, to=to), scene=scene)
+        return Leadership(moved.leader, moved.token)
 
     def upload_mesh(self, name: str, vertices: columns.ColumnLike, indices: columns.ColumnLike,
                     parts: Sequence[MeshPart] = (), progress: Optional[meshes.Progress] = None) -> Mesh:
@@ -185,14 +235,14 @@ class Client:
         A mesh whose content the server already has is not sent again. Safe to repeat.
         """
         rpc = _rpc("Scene", "UploadMesh")
-        messages = meshes.upload_messages(name, vertices, indices, parts, progress)
-        call = self._connection.channel.stream_unary(rpc.path, rpc.request.SerializeToString)
-        self._connection.continue_connecting()
-        try:
-            _, metadata = self._connection.metadata()
-            raw = call(messages, timeout=self._connection.long_timeout, metadata=metadata)
-        except grpc.RpcError as failure:
-            raise self._failed(failure) from None
+
+        def attempt(connection: Connection, timeout: float) -> bytes:
+            messages = meshes.upload_messages(name, vertices, indices, parts, progress)
+            call = connection.channel.stream_unary(rpc.path, rpc.request.SerializeToString)
+            _, metadata = connection.metadata()
+            return bytes(call(messages, timeout=timeout, metadata=metadata))
+
+        raw = self._connection.transfer(attempt)
         mesh = Mesh.of(parsed(rpc.response, raw).mesh)
         # The reply may lack some of the parts, but the server's parts are those of this upload.
         return dataclasses.replace(mesh, parts=tuple(MeshPart(part.name, part.first_triangle) for part in parts))
@@ -200,16 +250,14 @@ class Client:
     def download_mesh(self, name: str) -> MeshColumns:
         """Returns an uploaded mesh with its columns, as the server stores it."""
         rpc = _rpc("Scene", "DownloadMesh")
-        call = self._connection.channel.unary_stream(rpc.path)
-        self._connection.continue_connecting()
-        try:
-            _, metadata = self._connection.metadata()
-            answers = call(rpc.request(mesh=name).SerializeToString(), timeout=self._connection.long_timeout,
-                           metadata=metadata)
-            pieces = [parsed(rpc.response, raw) for raw in answers]
-        except grpc.RpcError as failure:
-            raise self._failed(failure) from None
-        return MeshColumns.of(pieces)
+
+        def attempt(connection: Connection, timeout: float) -> List[Any]:
+            call = connection.channel.unary_stream(rpc.path)
+            _, metadata = connection.metadata()
+            answers = call(rpc.request(mesh=name).SerializeToString(), timeout=timeout, metadata=metadata)
+            return [parsed(rpc.response, raw) for raw in answers]
+
+        return MeshColumns.of(self._connection.transfer(attempt))
 
     def meshes(self) -> List[Mesh]:
         """Returns all uploaded meshes, ascending by name."""
@@ -252,12 +300,15 @@ class Client:
         once_only = batch.message.writer != 0 and batch.message.batch != 0
         raw = self._connection.unary_bytes(rpc.path, batch.request_bytes(scene), scene=scene, repeat=once_only,
                                            is_update=True)
-        return Ack.of(parsed(rpc.response, raw).ack)
+        ack = Ack.of(parsed(rpc.response, raw).ack)
+        self._connection.saw(scene, ack)
+        return ack
 
     def query(self, scene: str, batch: QueryBatch) -> QueryResult:
         """Runs one batch of queries, all at one revision. For a sequence of batches use query_stream()."""
         try:
-            return QueryResult.from_bytes(self.query_bytes(scene, batch.request_bytes(scene)))
+            return QueryResult.from_bytes(self._connection.query_bytes(
+                _QUERY.path, batch.request_bytes(scene), scene, batch.names_revision, batch.leader_only))
         except LocusError as error:
             if error.code != grpc.StatusCode.DEADLINE_EXCEEDED or error.refused:
                 raise
@@ -276,34 +327,43 @@ class Client:
         request = b"".join((rpc.request(scene=scene).SerializeToString(), wire.head(numbers["update"], len(changes)),
                             changes, wire.head(numbers["queries"], len(batch)), batch))
         once_only = update.message.writer != 0 and update.message.batch != 0
-        return StepResult.from_bytes(
+        result = StepResult.from_bytes(
             self._connection.unary_bytes(rpc.path, request, scene=scene, repeat=once_only, is_update=True))
+        self._connection.saw(scene, result.ack)
+        return result
 
     def query_bytes(self, scene: str, request: bytes) -> bytes:
         """Runs an encoded batch. `request` are the bytes from QueryBatch.request_bytes(). Returns the bytes of the
         response, for QueryResult.from_bytes().
 
-        For callers that reuse requests, or measure the cost of encoding and decoding.
+        For callers that reuse requests, or measure the cost of encoding and decoding. In a cluster, the batch is answered
+        at the revision that it names, also if that is lower than one seen before; without one, as by query().
         """
-        return self._connection.unary_bytes(_rpc("Query", "Query").path, request, scene=scene, repeat=True)
+        return self._connection.query_bytes(_QUERY.path, request, scene, names_revision(request), False)
 
-    def update_stream(self, scene: str, *, max_in_flight: int = 8, reconnect: Retry = Retry(attempts=10),
+    def update_stream(self, scene: str, *, max_in_flight: int = 8, reconnect: Optional[Retry] = None,
                       lease_ms: int = 0) -> UpdateStream:
         """Returns a pipelined stream of update batches to one scene, each applied exactly once. The stream connects
-        when the first batch is sent.
+        when the first batch is sent. `reconnect`: policy of attempts to connect again, by default 10 attempts, in a
+        cluster the policy for its calls.
 
         `lease_ms`: lease of the stream's writer in milliseconds, at most one day; 0 = none. When no batch of the stream
         has arrived for that long, the server removes all objects that the stream inserted. See UpdateStream.
         """
-        return UpdateStream(self._connection, scene, max_in_flight, reconnect, lease_ms)
+        return UpdateStream(self._connection, scene, max_in_flight, self._reconnect(reconnect, _RECONNECT), lease_ms)
 
-    def query_stream(self, scene: str, *, max_in_flight: int = 8, reconnect: Retry = Retry(),
+    def query_stream(self, scene: str, *, max_in_flight: int = 8, reconnect: Optional[Retry] = None,
                      lease_ms: int = 0) -> QueryStream:
         """Returns a pipelined stream of query batches to one scene. The stream connects when the first batch is sent.
 
         `lease_ms`: lease of the writer of the stream's steps, as for update_stream(); it begins with the first step.
         """
-        return QueryStream(self._connection, scene, max_in_flight, reconnect, lease_ms)
+        return QueryStream(self._connection, scene, max_in_flight, self._reconnect(reconnect, Retry()), lease_ms)
+
+    def _reconnect(self, given: Optional[Retry], alone: Retry) -> Retry:
+        if given is not None:
+            return given
+        return self._connection.retry if isinstance(self._connection, ClusterConnection) else alone
 
     def _pages(self, rpc: schema.Method, **fields: Any) -> Iterator[Any]:
         request = rpc.request(**fields)
@@ -313,27 +373,3 @@ class Client:
             if not page.next_page_token:
                 return
             request.page_token = page.next_page_token
-
-    def _failed(self, failure: grpc.RpcError) -> LocusError:
-        error = from_call(failure)
-        self._connection.note_failure(error)
-        return error
-
-    def _greet(self, wait_for_server: bool) -> None:
-        """Makes a first call to the server, so that connect() itself fails with a clear message if the address is
-        wrong.
-        """
-        rpc = _rpc("Server", "GetServer")
-        call = self._connection.channel.unary_unary(rpc.path)
-        try:
-            _, metadata = self._connection.metadata()
-            call(b"", timeout=self._connection.timeout, wait_for_ready=wait_for_server, metadata=metadata)
-        except grpc.RpcError as failure:
-            error = from_call(failure)
-            if error.code == grpc.StatusCode.PERMISSION_DENIED:  # the server answers, and other calls may be permitted
-                return
-            silent = error.code in (grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.DEADLINE_EXCEEDED)
-            if error.refused or connection_advice(error.message) or not silent:
-                raise error from None
-            message = f"nothing answers at {self.address}: start locusd there, or give its address"
-            raise LocusError(grpc.StatusCode.UNAVAILABLE, message) from None

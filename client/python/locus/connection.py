@@ -1,23 +1,34 @@
-"""gRPC channel to one locusd: addresses, deadlines and retries. Internal to the package."""
+"""gRPC channel to one locusd: addresses, deadlines and retries. Internal to the package.
+
+The methods of Connection that Client and the streams call are also those of ClusterConnection (cluster.py), which chooses a server
+for each call.
+"""
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import random
 import re
 import time
-from typing import Any, Callable, List, Optional, Tuple, TypeVar
+from typing import Any, Callable, Iterator, List, Optional, Tuple, TypeVar
 
 import grpc
 
 from . import schema
 from .credentials import Credentials, Metadata, Token, stays_on_this_machine
-from .errors import LocusError, from_call, outcome_unknown, parsed
+from .errors import LocusError, connection_advice, from_call, outcome_unknown, parsed
 
 DEFAULT_PORT = 7575
 _MAX_CONNECTING_SECONDS = 0.1
 _PROBE_SECONDS = 10.0
+# Options of a channel to a member of a cluster, whose machine may vanish without a word: maximum time to connect, and
+# time after which a server that does not answer pings is given up. Servers accept a ping every 5 s.
+_MEMBER_OPTIONS: List[Tuple[str, object]] = [
+    ("grpc.min_reconnect_backoff_ms", 1000), ("grpc.keepalive_time_ms", 6000), ("grpc.keepalive_timeout_ms", 2000),
+    ("grpc.http2.max_pings_without_data", 0)]
 _LEGAL_SCENE = re.compile(r"[!-~]{1,63}")
 _Answer = TypeVar("_Answer")
+_GREETING = schema.method("locus.v1.ServerService", "GetServer")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -41,6 +52,12 @@ class Retry:
         return max(wait * random.uniform(0.8, 1.2), error.retry_after)
 
 
+def nothing_answers(addresses: str) -> LocusError:
+    """Returns the error of a connection that cannot be made."""
+    return LocusError(grpc.StatusCode.UNAVAILABLE,
+                      f"nothing answers at {addresses}: start locusd there, or give its address")
+
+
 def target_of(address: str) -> str:
     """Returns `address` as a target for gRPC. Adds the default port if the address has no port."""
     if not address:
@@ -60,7 +77,8 @@ class Connection:
     """Owner of one gRPC channel. Thread-safe."""
 
     def __init__(self, address: str, *, timeout: float, long_timeout: float, max_send_bytes: int,
-                 max_receive_bytes: int, retry: Retry, credentials: Credentials = Credentials()) -> None:
+                 max_receive_bytes: int, retry: Retry, credentials: Credentials = Credentials(),
+                 is_member: bool = False) -> None:
         self.address = target_of(address)
         self.token = Token(credentials, self.address)
         self.timeout = timeout
@@ -73,6 +91,8 @@ class Connection:
             ("grpc.initial_reconnect_backoff_ms", 100), ("grpc.max_reconnect_backoff_ms", 2000)]
         if stays_on_this_machine(self.address):  # a proxy set in the environment cannot reach this host's loopback
             options.append(("grpc.enable_http_proxy", 0))
+        if is_member:
+            options += _MEMBER_OPTIONS
         self.channel = credentials.channel(self.address, options)
 
     def close(self) -> None:
@@ -117,13 +137,69 @@ class Connection:
             pass
         self._probe = None
 
+    def greet(self, wait_for_server: bool, timeout: Optional[float] = None) -> None:
+        """Calls GetServer, so that connect() fails with a clear message if the address is wrong."""
+        call = self.channel.unary_unary(_GREETING.path)
+        try:
+            _, metadata = self.metadata()
+            call(b"", timeout=self.timeout if timeout is None else timeout, wait_for_ready=wait_for_server,
+                 metadata=metadata)
+        except grpc.RpcError as failure:
+            error = from_call(failure)
+            if error.code == grpc.StatusCode.PERMISSION_DENIED:  # the server answers, and other calls may be permitted
+                return
+            silent = error.code in (grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.DEADLINE_EXCEEDED)
+            if error.refused or connection_advice(error.message) or not silent:
+                raise error from None
+            raise nothing_answers(self.address) from None
+
+    @contextlib.contextmanager
+    def use(self, scene: str, reads: bool) -> Iterator["Connection"]:
+        """Returns the connection for a stream to a scene. `reads`: the stream has queries only."""
+        yield self
+
+    def note_end(self, used: "Connection", scene: str, error: LocusError) -> bool:
+        """Notes the error that ended a call of a stream. Returns True if another server may answer at once."""
+        return False
+
+    def moves(self, error: LocusError) -> bool:
+        """Returns True if a message that was answered by this error must be sent to another server."""
+        return False
+
+    def reading(self, scene: str, names_revision: bool, leader_only: bool) -> None:
+        """Returns the settings that are added to the view of a query: none."""
+
+    def saw(self, scene: str, ack: Any) -> None:
+        """Notes the ack of an update."""
+
+    def forget(self, scene: str) -> None:
+        """Notes that a scene was deleted."""
+
+    def gave_up(self, error: LocusError) -> LocusError:
+        """Returns the error of a stream whose last attempt to open a call failed with `error`."""
+        return error
+
+    def transfer(self, attempt: Callable[["Connection", float], _Answer]) -> _Answer:
+        """Runs a transfer of a mesh: calls attempt(connection, timeout in seconds)."""
+        self.continue_connecting()
+        try:
+            return attempt(self, self.long_timeout)
+        except grpc.RpcError as failure:
+            error = from_call(failure)
+            self.note_failure(error)
+            raise error from None
+
     def unary(self, rpc: schema.Method, request: Any, *, scene: str = "", repeat: bool = False,
-              timeout: Optional[float] = None) -> Any:
+              timeout: Optional[float] = None, route: str = "") -> Any:
         """Calls a unary rpc with a message and returns the response message. `repeat`: the call is idempotent and may
-        be retried.
+        be retried. `route`: scene by which a cluster chooses the server, if it is not `scene`.
         """
         raw = self.unary_bytes(rpc.path, request.SerializeToString(), scene=scene, repeat=repeat, timeout=timeout)
         return parsed(rpc.response, raw)
+
+    def query_bytes(self, path: str, request: bytes, scene: str, names_revision: bool, leader_only: bool) -> bytes:
+        """Runs an encoded query. The last two arguments describe its view, for clusters."""
+        return self.unary_bytes(path, request, scene=scene, repeat=True)
 
     def unary_bytes(self, path: str, request: bytes, *, scene: str = "", repeat: bool = False,
                     timeout: Optional[float] = None, is_update: bool = False) -> bytes:

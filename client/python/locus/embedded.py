@@ -69,7 +69,7 @@ class EmbeddedClient(Client):
             self._daemon.check()
             if os.path.exists(self._daemon.socket):
                 try:
-                    self._greet(True)
+                    self._connection.greet(True)
                     return
                 except LocusError:  # the daemon still recovers its scenes, or has just ended
                     self._daemon.check()

@@ -1,7 +1,7 @@
 """LocusError: the exception for refused requests and failed calls, with the details that the server sent."""
 from __future__ import annotations
 
-from typing import Any, Optional
+from typing import Any, Optional, Tuple
 
 import grpc
 
@@ -41,6 +41,9 @@ _ON_CONNECTIONS = (
      "require TLS, or a client certificate that it knows"),
 )
 
+# Beginnings of gRPC's messages about calls that were never sent.
+_NOT_CONNECTED = ("failed to connect to all addresses", "DNS resolution failed")
+
 
 def connection_advice(message: str) -> str:
     """Returns advice if the connection was not permitted, the server's name is unknown, or TLS failed. Returns an empty
@@ -55,13 +58,15 @@ class LocusError(Exception):
     `code` is the gRPC status code. If the server refused the request, `reason` is its reason, `field` the path of the
     wrong field (`blocks[2].rays.directions`) and `index` the wrong entry, from 0. If a limit was exceeded, `limit` is
     its name, `limit_value` its value and `asked` the requested value. `retry_after` is the time in seconds after which
-    the same request may succeed; 0 = the server stated no time. If the error did not come from the server, `reason` is
-    UNSPECIFIED, and `hint` suggests a remedy if one is known.
+    the same request may succeed; 0 = the server stated no time. With Reason.ELSEWHERE, `addresses` names the servers of
+    the cluster that have the scene, its leader first, and `token` is the number of that leadership, which is higher for
+    a newer leader. If the error did not come from the server, `reason` is UNSPECIFIED, and `hint` suggests a remedy if
+    one is known.
     """
 
     def __init__(self, code: grpc.StatusCode, message: str, *, reason: Reason = Reason.UNSPECIFIED, field: str = "",
                  index: Optional[int] = None, limit: str = "", limit_value: float = 0, asked: float = 0,
-                 retry_after: float = 0) -> None:
+                 retry_after: float = 0, addresses: Tuple[str, ...] = (), token: int = 0) -> None:
         super().__init__(code, message)
         self.code = code
         self.message = message
@@ -72,6 +77,8 @@ class LocusError(Exception):
         self.limit_value = limit_value
         self.asked = asked
         self.retry_after = retry_after
+        self.addresses = addresses
+        self.token = token
 
     @property
     def hint(self) -> str:
@@ -96,6 +103,11 @@ class LocusError(Exception):
         for BATCH_GAP, which is about the numbers before the batch.
         """
         return (self.refused and self.reason != Reason.BATCH_GAP) or self.code == grpc.StatusCode.PERMISSION_DENIED
+
+    @property
+    def not_sent(self) -> bool:
+        """True if no connection to the server could be made, so that the request did not reach it."""
+        return self.code == grpc.StatusCode.UNAVAILABLE and not self.refused and self.message.startswith(_NOT_CONNECTED)
 
     @property
     def worth_repeating(self) -> bool:
@@ -123,7 +135,8 @@ def from_error(error: Any) -> LocusError:
     return LocusError(code if code != grpc.StatusCode.OK else grpc.StatusCode.UNKNOWN, error.message,
                       reason=reason_of(error.reason), field=error.field,
                       index=error.index if error.HasField("index") else None, limit=error.limit,
-                      limit_value=error.limit_value, asked=error.asked, retry_after=error.retry_after_ms / 1000)
+                      limit_value=error.limit_value, asked=error.asked, retry_after=error.retry_after_ms / 1000,
+                      addresses=tuple(error.addresses), token=error.token)
 
 
 def from_call(call: Any) -> LocusError:

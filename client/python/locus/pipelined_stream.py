@@ -13,15 +13,18 @@ import secrets
 import threading
 import time
 from concurrent.futures import Future
-from typing import Any, Callable, Generic, Iterator, List, Optional, Sequence, Tuple, TypeVar
+from typing import Any, Callable, Generic, Iterator, List, Optional, Sequence, Tuple, TypeVar, Union
 
 import grpc
 
+from .cluster import ClusterConnection, Reading
 from .connection import Connection, Retry
 from .enums import Reason
 from .errors import LocusError, from_call, outcome_unknown
 
 Result = TypeVar("Result")
+AnyConnection = Union[Connection, ClusterConnection]
+_MAX_HOPS = 8  # servers of a cluster that are tried in a row without a wait
 # Status codes after which a new call may succeed, in addition to the codes that worth_repeating covers.
 _AGAIN = (grpc.StatusCode.CANCELLED, grpc.StatusCode.INTERNAL)
 
@@ -29,7 +32,9 @@ _AGAIN = (grpc.StatusCode.CANCELLED, grpc.StatusCode.INTERNAL)
 class Item(Generic[Result]):
     """Message that was accepted and is not yet answered."""
 
-    def __init__(self, batch: bytes, is_update: bool, held: Sequence[bytes] = (), is_renewal: bool = False) -> None:
+    def __init__(self, batch: bytes, is_update: bool, held: Sequence[bytes] = (), is_renewal: bool = False,
+                 reading: Optional[Reading] = None) -> None:
+        self.reading = reading  # settings of the view of a query; None for updates, and outside of clusters
         self.batch = batch  # the encoded message without the numbers
         self.held = held  # encoded messages that are sent before `batch` and are applied with it
         self.held_sequences = range(0)
@@ -64,11 +69,14 @@ class PipelinedStream(Generic[Result]):
     the error of the first refused message. After a broken connection all of them are sent again, since the server has
     applied none.
 
+    In a cluster, a message that a server refuses because another one leads the scene is not answered: the stream opens a
+    call to that server and sends all unanswered messages again.
+
     Use as a context manager: the end of the `with` block waits for all answers, or cancels the stream after an
     exception.
     """
 
-    def __init__(self, connection: Connection, path: str, scene: str, max_in_flight: int, retry: Retry,
+    def __init__(self, connection: AnyConnection, path: str, scene: str, max_in_flight: int, retry: Retry,
                  lease_ms: int) -> None:
         if not 0 <= lease_ms < 2**32:
             raise ValueError(f"lease_ms is {lease_ms}: give milliseconds, at most one day, or 0 for no lease")
@@ -92,6 +100,10 @@ class PipelinedStream(Generic[Result]):
         self._reused_end = 0  # end of the uncertain numbers that were used again
         self._last_sequence = 0
         self._failures = 0
+        self._hops = 0
+        self._may_follow = False  # True if another server may answer at once
+        self._moved: Optional[LocusError] = None  # error that moves the stream to another server
+        self._needs_leader = True  # False if only queries are sent
         self._handing_over = 0
         self._closing = False
         self._broken_off = False
@@ -140,8 +152,12 @@ class PipelinedStream(Generic[Result]):
         """Returns whether the ack in the result of an item with an update is marked as duplicate."""
         return bool(result.duplicate)
 
-    def _answered(self, result: Any) -> None:
+    def _answered(self, item: Item[Result], result: Any) -> None:
         """Handles the result of an item."""
+
+    def _asks_again(self, item: Item[Result], error: LocusError) -> bool:
+        """Returns True if a query must be sent again, to the leader of the scene."""
+        return item.reading is not None and item.reading.turns_to_leader(error)
 
     def _closes_gap(self, item: Item[Result], error: LocusError) -> bool:
         """Returns True if the error of an item shows that uncertain numbers before it were not used. Such numbers are
@@ -195,8 +211,9 @@ class PipelinedStream(Generic[Result]):
             self._uncertain = 0
         return None
 
-    def _send(self, batch: bytes, is_update: bool, held: Sequence[bytes] = ()) -> "Future[Any]":
-        item: Item[Any] = Item(batch, is_update, held)
+    def _send(self, batch: bytes, is_update: bool, held: Sequence[bytes] = (),
+              reading: Optional[Reading] = None) -> "Future[Any]":
+        item: Item[Any] = Item(batch, is_update, held, reading=reading)
         with self._changed:
             self._changed.wait_for(
                 lambda: self._ended or self._closing or len(self._items) < self._max_in_flight)
@@ -296,20 +313,32 @@ class PipelinedStream(Generic[Result]):
                 return True
             self._ended = True
             self._end = self._fatal or (end if wait is None or self._broken_off else None)
+            if self._end is not None and not self._broken_off:
+                self._end = self._connection.gave_up(self._end)
             return False
 
     def _run_call(self) -> Optional[LocusError]:
         """Opens a call and reads its responses to the end. Returns the error that ended the call, or None."""
+        try:
+            with self._connection.use(self._scene, not self._needs_leader) as connection:
+                error = self._run_call_on(connection)
+                error, self._moved = self._moved or error, None
+                self._may_follow = error is not None and self._connection.note_end(connection, self._scene, error)
+                return error
+        except LocusError as unconnected:
+            return unconnected
+
+    def _run_call_on(self, connection: Connection) -> Optional[LocusError]:
         over = threading.Event()
-        method = self._connection.channel.stream_stream(self._path)
-        self._connection.continue_connecting()
+        method = connection.channel.stream_stream(self._path)
+        connection.continue_connecting()
         try:
             with self._changed:
                 for item in self._items:
                     item.sent_before = item.sent_before or item.written
                     item.begin_again()
                 self._group_end = None
-                used, metadata = self._connection.metadata(self._scene)
+                used, metadata = connection.metadata(self._scene)
                 self._call = call = method(self._requests(over), metadata=metadata)
                 if self._broken_off:
                     call.cancel()
@@ -321,8 +350,8 @@ class PipelinedStream(Generic[Result]):
             return unreadable
         except grpc.RpcError as failure:
             error = from_call(failure)
-            self._connection.note_failure(error)
-            if error.code == grpc.StatusCode.UNAUTHENTICATED and self._connection.token.has_newer(used):
+            connection.note_failure(error)
+            if error.code == grpc.StatusCode.UNAUTHENTICATED and connection.token.has_newer(used):
                 return LocusError(grpc.StatusCode.UNAVAILABLE, f"the token has changed: {error.message}")
             return error
         except ValueError as failure:  # raised by gRPC for a closed channel
@@ -339,9 +368,9 @@ class PipelinedStream(Generic[Result]):
         """
         while True:
             with self._changed:
-                self._wait_or_renew(lambda: over.is_set() or self._group_end is not None
+                self._wait_or_renew(lambda: over.is_set() or self._moved is not None or self._group_end is not None
                                     or self._unwritten() is not None or (self._closing and not self._items))
-                message = None if over.is_set() else self._next_message()
+                message = None if over.is_set() or self._moved is not None else self._next_message()
             if message is None:
                 return
             yield message
@@ -378,8 +407,17 @@ class PipelinedStream(Generic[Result]):
             if item.sequence != sequence:
                 item.refusal = item.refusal or self._held_answer(outcome)
                 return
-            self._failures = 0
             outcome = item.refusal or outcome
+            if self._moved is not None:
+                return
+            if isinstance(outcome, LocusError) and self._connection.moves(outcome):
+                self._move(position, outcome)
+                return
+            self._failures = self._hops = 0
+            if isinstance(outcome, LocusError) and self._asks_again(item, outcome):
+                item.begin_again()
+                self._changed.notify_all()
+                return
             if isinstance(outcome, LocusError) and self._closes_gap(item, outcome):
                 self._number_again(position)
                 self._changed.notify_all()
@@ -392,7 +430,7 @@ class PipelinedStream(Generic[Result]):
                 if item.is_update:
                     outcome = self._update_applied(item, self._is_duplicate(outcome)) or outcome
                 if not isinstance(outcome, LocusError):
-                    self._answered(outcome)
+                    self._answered(item, outcome)
             self._handing_over += 1
             self._changed.notify_all()
             if self._fatal is not None:
@@ -401,6 +439,20 @@ class PipelinedStream(Generic[Result]):
         with self._changed:
             self._handing_over -= 1
             self._changed.notify_all()
+
+    def _move(self, position: int, error: LocusError) -> None:
+        """Ends the call, to continue at another server, since the item at index `position` was refused with `error`."""
+        self._moved = error
+        refused = self._items[position]
+        if refused.is_update and error.refused and not refused.sent_before:
+            # The server applied neither this update nor a later one, whose number would have left a gap.
+            for item in self._items[position:]:
+                item.written = item.written and not item.is_update
+        if refused.reading is not None and error.reason == Reason.ELSEWHERE:
+            refused.reading.leader = True  # a follower that is older than the view admits
+            self._needs_leader = True
+        self._call.cancel()
+        self._changed.notify_all()
 
     def _cut_short(self) -> Optional[LocusError]:
         with self._changed:
@@ -414,10 +466,14 @@ class PipelinedStream(Generic[Result]):
         """
         if self._broken_off or self._fatal is not None:
             return None
-        if not (end.worth_repeating or (end.code in _AGAIN and not end.refused)):
+        if not (end.worth_repeating or (end.code in _AGAIN and not end.refused) or self._connection.moves(end)):
             return None
         if not self._items:
             return 0.0
+        if self._may_follow and self._hops < _MAX_HOPS:
+            self._hops += 1
+            return 0.0
+        self._hops = 0
         self._failures += 1
         return self._retry.wait_after(self._failures, end)
 
@@ -426,7 +482,11 @@ class PipelinedStream(Generic[Result]):
         with self._changed:
             items, end = list(self._items), self._end
         for item in items:
-            _resolve(item, end)
+            was_sent = item.is_update and (item.written or item.sent_before)
+            if end is not None and was_sent and end.changed_nothing and self._connection.moves(end):
+                _resolve(item, outcome_unknown(end))  # the server that ended the stream may not be the one it was sent to
+            else:
+                _resolve(item, end)
         with self._changed:
             self._items.clear()
             self._changed.notify_all()

@@ -16,6 +16,13 @@ _KINDS = {name: schema.numbers(name.capitalize())
                        "sight", "sweeps")}
 
 
+def names_revision(request: bytes) -> bool:
+    """Returns whether the view of an encoded request for Query names a revision."""
+    batch = wire.fields(wire.column(wire.fields(memoryview(request)), _REQUEST["batch"]))
+    view = wire.fields(wire.column(batch, _BATCH["view"]))
+    return _VIEW["at_least"] in view or _VIEW["exactly"] in view
+
+
 class Block(NamedTuple):
     """Settings common to all kinds of block, for N queries. All settings are optional. If a setting may have N numbers
     or one, one number applies to all queries.
@@ -142,22 +149,35 @@ class QueryBatch:
     `max_reply_bytes`: the maximum size of the answer, 0 = 4,000,000. The attribute `waits_for` is the number of the
     minimum revision; None if the batch waits for none.
 
+    In a cluster, `leader_only` lets only the leader of the scene answer, so that the answer includes every update that
+    was acknowledged before the batch was sent; `max_age_ms`: maximum time in milliseconds for which the server that
+    answers may have missed later revisions, 0 = unlimited. A server that cannot answer so names the leader by
+    Reason.ELSEWHERE, which a client with several addresses follows.
+
     The batch checks types and lengths of columns (TypeError and ValueError name the column); the server checks values.
     Buffers are borrowed: leave them unchanged until the batch was sent. A batch may be sent several times. Methods
     return the batch, so that calls can be chained. Not thread-safe.
     """
 
     def __init__(self, *, at_least: Optional[Revision] = None, exactly: Optional[Revision] = None, max_work: int = 0,
-                 explain: bool = False, max_reply_bytes: int = 0, by_list: bool = False) -> None:
+                 explain: bool = False, max_reply_bytes: int = 0, by_list: bool = False, max_age_ms: int = 0,
+                 leader_only: bool = False) -> None:
         if at_least is not None and exactly is not None:
             raise ValueError("give at_least or exactly, not both")
         self._parts = wire.Parts()
         self.waits_for: Optional[int] = None if at_least is None else at_least.revision
         moment = at_least or exactly
+        self.names_revision = moment is not None
+        self.leader_only = leader_only
+        view = wire.Parts()
         if moment is not None:
-            view = wire.Parts()
             view.add_fixed64(_VIEW["exactly" if at_least is None else "at_least"], moment.revision)
             view.add_fixed64(_VIEW["epoch"], moment.epoch)
+        if max_age_ms:
+            view.add_varint(_VIEW["max_age_ms"], max_age_ms)
+        if leader_only:
+            view.add_varint(_VIEW["leader_only"], 1)
+        if view.size:
             self._parts.add_parts(_BATCH["view"], view)
         if max_work:
             self._parts.add_fixed64(_BATCH["max_work"], max_work)

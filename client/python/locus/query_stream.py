@@ -7,9 +7,9 @@ from concurrent.futures import Future
 from typing import Any, Tuple
 
 from . import schema, wire
-from .connection import Connection, Retry
+from .connection import Retry
 from .errors import from_error, neither, parsed
-from .pipelined_stream import Item, PipelinedStream
+from .pipelined_stream import AnyConnection, Item, PipelinedStream
 from .queries import QueryBatch
 from .results import QueryResult, StepResult
 from .updates import UpdateBatch
@@ -26,8 +26,9 @@ class QueryStream(PipelinedStream[Any]):
     only once. The stream ends in the same cases as an UpdateStream, and renews its lease like one.
     """
 
-    def __init__(self, connection: Connection, scene: str, max_in_flight: int, retry: Retry, lease_ms: int) -> None:
+    def __init__(self, connection: AnyConnection, scene: str, max_in_flight: int, retry: Retry, lease_ms: int) -> None:
         super().__init__(connection, _METHOD.path, scene, max_in_flight, retry, lease_ms)
+        self._needs_leader = False
 
     def send(self, batch: QueryBatch) -> "Future[QueryResult]":
         """Sends a batch. Blocks while `max_in_flight` batches are unanswered.
@@ -37,7 +38,9 @@ class QueryStream(PipelinedStream[Any]):
         of 1,024 queries in flight are enough, or 2 batches of 8,192.
         """
         pieces = batch.batch_bytes()
-        return self._send(wire.head(_BATCH, len(pieces)) + pieces, is_update=False)
+        reading = self._connection.reading(self._scene, batch.names_revision, batch.leader_only)
+        self._needs_leader = self._needs_leader or batch.leader_only
+        return self._send(wire.head(_BATCH, len(pieces)) + pieces, is_update=False, reading=reading)
 
     def step(self, update: UpdateBatch, queries: QueryBatch) -> "Future[StepResult]":
         """Sends a step: the server applies `update`, then answers `queries` at a revision that contains it. Otherwise
@@ -47,6 +50,7 @@ class QueryStream(PipelinedStream[Any]):
         nothing was changed and no query was run. Steps are applied in the order sent. The stream replaces the `writer`
         and `number` of the sent copy of the update.
         """
+        self._needs_leader = True  # from the next call on, if the current one is to a follower, which refuses the step
         changes, batch = update.message.SerializeToString(), queries.batch_bytes()
         return self._send(b"".join((wire.head(_UPDATE, len(changes)), changes, wire.head(_BATCH, len(batch)), batch)),
                           is_update=True)
@@ -56,10 +60,18 @@ class QueryStream(PipelinedStream[Any]):
         if item.is_update:
             # This is the second occurrence of the field `update`. Protobuf parsers merge the two.
             self._set_numbers(numbers.update, item)
+        elif item.reading is not None:
+            item.reading.write(numbers.batch.view)
         return b"".join((item.batch, numbers.SerializeToString()))
 
     def _is_duplicate(self, result: Any) -> bool:
         return isinstance(result, StepResult) and result.ack.duplicate
+
+    def _answered(self, item: Item[Any], result: Any) -> None:
+        if item.reading is not None:
+            item.reading.answered(result)
+        elif item.is_update:
+            self._connection.saw(self._scene, result.ack if isinstance(result, StepResult) else result)
 
     def _answer_in(self, response: bytes) -> Tuple[int, Any]:
         found = wire.fields(memoryview(response))

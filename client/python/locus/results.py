@@ -155,12 +155,14 @@ class BlockResult:
 class QueryResult(Revision):
     """Result of a batch at one revision. `blocks` are in the order of the request; `tick` is the scene's tick.
 
-    `work` is the work of the whole batch; None without `explain`.
+    `work` is the work of the whole batch; None without `explain`. `age_ms`: in a cluster, the time in milliseconds for
+    which the server may have missed later revisions, rounded up; 0 from the leader of the scene.
     """
 
     tick: int
     blocks: Tuple[BlockResult, ...]
     work: Optional[Work]
+    age_ms: int
 
     @classmethod
     def of(cls, message: memoryview) -> "QueryResult":
@@ -174,6 +176,7 @@ class QueryResult(Revision):
         result.__dict__.update(
             epoch=wire.fixed64(found, _RESULT["epoch"]), revision=wire.fixed64(found, _RESULT["revision"]),
             tick=wire.fixed64(found, _RESULT["tick"]), work=_work_in(found, _RESULT["work"]),
+            age_ms=wire.varint(found, _RESULT["age_ms"]),
             blocks=tuple(map(BlockResult, wire.views(found, _RESULT["blocks"]))))
         return result
 

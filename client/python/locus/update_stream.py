@@ -9,9 +9,9 @@ from typing import Any, Optional, Sequence, Tuple
 import grpc
 
 from . import schema, wire
-from .connection import Connection, Retry
+from .connection import Retry
 from .errors import LocusError, from_error, neither, parsed
-from .pipelined_stream import Item, PipelinedStream
+from .pipelined_stream import AnyConnection, Item, PipelinedStream
 from .updates import UpdateBatch
 from .values import Ack, Revision
 
@@ -37,7 +37,7 @@ class UpdateStream(PipelinedStream[Ack]):
     The lease runs out after the stream or its process has ended, and while the server cannot be reached.
     """
 
-    def __init__(self, connection: Connection, scene: str, max_in_flight: int, retry: Retry, lease_ms: int) -> None:
+    def __init__(self, connection: AnyConnection, scene: str, max_in_flight: int, retry: Retry, lease_ms: int) -> None:
         super().__init__(connection, _METHOD.path, scene, max_in_flight, retry, lease_ms)
         self._last_ack: Optional[Ack] = None
 
@@ -98,5 +98,6 @@ class UpdateStream(PipelinedStream[Ack]):
             return message.sequence, Ack.of(message.ack)
         return message.sequence, from_error(message.error) if kind else neither()
 
-    def _answered(self, result: Any) -> None:
+    def _answered(self, item: Item[Ack], result: Any) -> None:
         self._last_ack = result
+        self._connection.saw(self._scene, result)

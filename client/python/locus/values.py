@@ -4,7 +4,7 @@ from __future__ import annotations
 import dataclasses
 from typing import Any, Dict, Optional, Tuple
 
-from .enums import OverloadPolicy, Reason, SceneState, Winding
+from .enums import Durability, OverloadPolicy, Reason, SceneRole, SceneState, Winding
 from .errors import reason_of
 
 
@@ -58,6 +58,45 @@ class Ack(Revision):
 
 
 @dataclasses.dataclass(frozen=True)
+class Follower:
+    """Member of a cluster that follows a scene. `revision` is the revision that it was last known to have, and `age` the
+    time in seconds for which it may have missed later revisions.
+    """
+
+    address: str
+    revision: int
+    age: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Placement:
+    """Members of a cluster that have the state of a scene. `role` is the role of the server that answered. `leader` is the
+    address of the leader, empty if there is none; `followers` are those that the server that answered knows. `token` is
+    the number of the leadership: each new leader has a higher one.
+    """
+
+    role: SceneRole
+    leader: str
+    followers: Tuple[Follower, ...]
+    token: int
+
+    @classmethod
+    def of(cls, message: Any) -> "Placement":
+        """Converts the protocol's ScenePlacement."""
+        role = message.role if message.role in SceneRole._value2member_map_ else 0
+        followers = tuple(Follower(other.address, other.revision, other.age_ms / 1000) for other in message.followers)
+        return cls(SceneRole(role), message.leader, followers, message.token)
+
+
+@dataclasses.dataclass(frozen=True)
+class Leadership:
+    """Result of Client.move_scene(): the address of the new leader, and the number of its leadership."""
+
+    leader: str
+    token: int
+
+
+@dataclasses.dataclass(frozen=True)
 class Scene(Revision):
     """Description of a scene at the time of the call.
 
@@ -68,6 +107,9 @@ class Scene(Revision):
     `history_bytes` bytes. `forgotten_ticks` ticks were dropped early for lack of memory. `mesh_bytes` is the memory of
     the placed meshes, which scenes share, and `recent_bytes` at most that of recent revisions. `idle_ttl_s` and
     `mesh_grace_s` are those of Client.create_scene(); 0 = never. `cell_size` is 0 if the server chooses it.
+    `durability` and `wanted_followers` are the `durability` and `followers` of Client.create_scene(). `placement` names
+    the members of a cluster that have the scene; None outside of a cluster. Client.scenes() describes scenes that the
+    server does not have by `name`, settings, `epoch` and `placement` only.
     """
 
     name: str
@@ -93,6 +135,9 @@ class Scene(Revision):
     idle_ttl_s: int = 0
     mesh_grace_s: int = 0
     cell_size: float = 0
+    durability: Durability = Durability.UNSPECIFIED
+    wanted_followers: int = 0
+    placement: Optional[Placement] = None
 
     @classmethod
     def of(cls, message: Any) -> "Scene":
@@ -100,12 +145,15 @@ class Scene(Revision):
         low, high = message.min, message.max
         bounds = ((low.x, low.y, low.z), (high.x, high.y, high.z)) if message.HasField("min") else None
         state = message.state if message.state in SceneState._value2member_map_ else 0
+        durability = message.spec.durability if message.spec.durability in Durability._value2member_map_ else 0
+        placement = Placement.of(message.placement) if message.HasField("placement") else None
         return cls(message.epoch, message.revision, message.name, SceneState(state), message.tick, message.objects,
                    message.instances, message.triangles, message.memory_bytes, message.pending_changes,
                    message.last_build_error, dict(message.spec.labels), Winding(message.spec.winding), bounds,
                    message.spec.history_ticks, message.oldest_tick, message.recorded_ticks, message.history_bytes,
                    OverloadPolicy(message.spec.overload), message.mesh_bytes, message.recent_bytes,
-                   message.forgotten_ticks, message.spec.idle_ttl_s, message.spec.mesh_grace_s, message.spec.cell_size)
+                   message.forgotten_ticks, message.spec.idle_ttl_s, message.spec.mesh_grace_s, message.spec.cell_size,
+                   Durability(durability), message.spec.followers, placement)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -169,9 +217,47 @@ class Quota:
 
 
 @dataclasses.dataclass(frozen=True)
+class Member:
+    """Living member of a cluster. `id` is chosen at random at each start of the server. `load` decides where new scenes
+    are placed. `draining` is True if the member takes no scenes because it shuts down.
+    """
+
+    id: int
+    address: str
+    zone: str
+    version: str
+    load: int
+    draining: bool
+
+
+@dataclasses.dataclass(frozen=True)
+class Cluster:
+    """Cluster, as the server that answered knows it. `members` are the living members, ascending by address; `member` is
+    the id of the one that answered, 0 if it is none at present because the engine does not answer. `engine` names the
+    hosts of the PostgreSQL that stores the scenes, and `engine_answers` is True if it answered the member's last beat.
+    The member leads `leading` scenes and follows `following` scenes.
+    """
+
+    members: Tuple[Member, ...]
+    member: int
+    engine: str
+    engine_answers: bool
+    leading: int
+    following: int
+
+    @classmethod
+    def of(cls, message: Any) -> "Cluster":
+        """Converts the protocol's Cluster."""
+        members = tuple(Member(one.id, one.address, one.zone, one.version, one.load, one.draining)
+                        for one in message.members)
+        return cls(members, message.member, message.engine, message.engine_answers, message.leading, message.following)
+
+
+@dataclasses.dataclass(frozen=True)
 class Server:
     """Description of the server. `limits` maps names to limits. `insecure` is True if the server was started with
-    --insecure. `use_hidden` is True if the caller may not see how much of the limits is used.
+    --insecure. `use_hidden` is True if the caller may not see how much of the limits is used. `cluster` is None if the
+    server belongs to no cluster.
     """
 
     version: str
@@ -180,13 +266,15 @@ class Server:
     limits: Dict[str, Limit]
     insecure: bool = False
     use_hidden: bool = False
+    cluster: Optional[Cluster] = None
 
     @classmethod
     def of(cls, message: Any) -> "Server":
         """Converts the protocol's GetServerResponse."""
         limits = {limit.name: Limit(limit.value, limit.used, limit.refused) for limit in message.limits}
         return cls(message.version, message.instruction_set, tuple(message.features), limits,
-                   message.insecure, message.use_hidden)
+                   message.insecure, message.use_hidden,
+                   Cluster.of(message.cluster) if message.HasField("cluster") else None)
 
 
 @dataclasses.dataclass(frozen=True)

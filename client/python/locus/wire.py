@@ -94,6 +94,16 @@ def fixed64(found: Fields, number: int) -> int:
     return int.from_bytes(pieces[-1], "little") if pieces else 0
 
 
+def varint(found: Fields, number: int) -> int:
+    """Returns a uint32 or bool field, 0 if it is absent."""
+    if number not in found:
+        return 0
+    value = found[number][-1]
+    if not isinstance(value, int):
+        raise unreadable(f"field {number} is no number")
+    return value
+
+
 def _encoded(value: int) -> bytes:
     if value < 128:
         return _SMALL[value]
