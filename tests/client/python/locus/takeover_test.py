@@ -1,0 +1,136 @@
+"""Tests of a client of three locusd on one replicated PostgreSQL, while servers are killed, frozen and drained."""
+import os
+import signal
+import threading
+import time
+import unittest
+
+import cluster_support
+import locus
+from cluster_support import Member, wait_until
+from locus import QueryBatch, ReadFrom, UpdateBatch
+from support import WAIT_SECONDS, listed
+
+MISSING = cluster_support.engine.unavailable()
+TAKEOVER_SECONDS = 60
+LOST, AFTER = 100, 200  # batches sent before a fault, and in all
+
+
+@unittest.skipIf(MISSING, MISSING)
+class TakeoverTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.engine = cluster_support.engine.Engine()
+        cls.addClassCleanup(cls.engine.close)
+
+    def setUp(self):
+        self.members = [self.start(name) for name in ("a", "b", "c")]
+        self.client = wait_until(lambda: locus.connect([member.address for member in self.members]))
+        self.addCleanup(self.client.close)
+        wait_until(lambda: len(self.client.server().cluster.members) >= 3)
+        self.scene = self._testMethodName[:60].replace("_", "-").rstrip("-")
+        self.client.create_scene(self.scene)
+
+    def start(self, name):
+        member = Member(self.engine, name)
+        self.addCleanup(member.close)
+        return member
+
+    def leader(self):
+        address = wait_until(lambda: self.client.scene(self.scene).placement.leader)
+        return next(member for member in self.members if member.address == address)
+
+    def reader(self, stop, **options):
+        """Starts a thread that queries until `stop` is set. Returns it and the list of the revisions that it sees."""
+        seen = []
+
+        def run():
+            with locus.connect([member.address for member in self.members], **options) as client:
+                while not stop.is_set():
+                    seen.append(client.query(self.scene, QueryBatch()).revision)
+                    time.sleep(0.01)
+
+        thread = threading.Thread(target=run)
+        thread.start()
+        return thread, seen
+
+    def send_through(self, fault):
+        """Sends numbered batches, with a fault among them. Returns the acks."""
+        stop = threading.Event()
+        thread, seen = self.reader(stop)
+        try:
+            with self.client.update_stream(self.scene) as stream:
+                sent = []
+                for tick in range(1, AFTER + 1):
+                    sent.append(stream.send(UpdateBatch(tick=tick).insert_balls([tick], [[tick, 0, 0]], 1)))
+                    if tick == LOST:
+                        sent[0].result(WAIT_SECONDS)
+                        fault()
+                acks = [future.result(TAKEOVER_SECONDS) for future in sent]
+        finally:
+            stop.set()
+            thread.join(WAIT_SECONDS)
+        self.assertEqual(seen, sorted(seen), "reads went back")
+        return acks
+
+    def assertAppliedOnce(self, acks):
+        """Checks that each batch was applied, once, in the order sent: the revisions are dense, and so are the objects."""
+        self.assertEqual([ack.revision for ack in acks], list(range(acks[0].revision, acks[0].revision + AFTER)))
+        self.assertEqual({ack.epoch for ack in acks}, {acks[0].epoch})
+        result = self.client.query(self.scene, QueryBatch().lookup(list(range(1, AFTER + 1))))
+        self.assertEqual((result.epoch, result.revision), (acks[-1].epoch, acks[-1].revision))
+        self.assertEqual(listed(result.blocks[0].ids), list(range(1, AFTER + 1)))
+
+    def test_killing_the_leader_loses_no_batch_and_applies_none_twice(self):
+        acks = self.send_through(lambda: self.leader().kill())
+        self.assertAppliedOnce(acks)
+
+    def test_draining_the_leader_loses_no_batch_and_applies_none_twice(self):
+        acks = self.send_through(lambda: self.leader().terminate())
+        self.assertAppliedOnce(acks)
+
+    def test_a_frozen_leader_is_left_and_acknowledges_nothing_when_it_wakes(self):
+        frozen = self.leader()
+        acks = self.send_through(lambda: os.kill(frozen.process.pid, signal.SIGSTOP))
+        os.kill(frozen.process.pid, signal.SIGCONT)
+        self.assertAppliedOnce(acks)
+        self.assertNotEqual(self.leader().address, frozen.address)
+
+    def test_a_moved_scene_is_followed(self):
+        first, other = self.leader(), None
+        with self.client.update_stream(self.scene) as stream:
+            stream.send(UpdateBatch(tick=1)).result(WAIT_SECONDS)
+            moved = self.client.move_scene(self.scene)
+            other = moved.leader
+            self.assertEqual(stream.send(UpdateBatch(tick=2)).result(WAIT_SECONDS).tick, 2)
+        self.assertNotEqual(other, first.address)
+        self.assertEqual(self.client.scene(self.scene).placement.leader, other)
+        self.assertEqual(self.client.query(self.scene, QueryBatch()).tick, 2)
+
+    def test_calls_survive_the_loss_of_the_leader(self):
+        self.client.apply(self.scene, UpdateBatch(tick=1, writer=7, number=1))
+        self.leader().kill()
+        ack = self.client.apply(self.scene, UpdateBatch(tick=2, writer=7, number=2))
+        self.assertEqual((ack.tick, ack.duplicate), (2, False))
+        self.assertTrue(self.client.apply(self.scene, UpdateBatch(tick=2, writer=7, number=2)).duplicate)
+        self.assertEqual(self.client.query(self.scene, QueryBatch()).tick, 2)
+        self.assertIn(self.scene, [scene.name for scene in self.client.scenes()])
+        self.client.create_scene(self.scene + ".2")
+        self.client.delete_scene(self.scene + ".2")
+
+    def test_a_client_of_one_address_is_told_where_to_go(self):
+        other = next(member for member in self.members if member is not self.leader())
+        with locus.connect(other.address) as client:
+            with self.assertRaisesRegex(locus.LocusError, self.leader().address) as refused:
+                client.apply(self.scene, UpdateBatch())
+        self.assertEqual(refused.exception.reason, locus.Reason.ELSEWHERE)
+        self.assertEqual(refused.exception.addresses, (self.leader().address,))
+        self.assertGreater(refused.exception.token, 0)
+
+    def test_one_address_is_enough_to_find_the_others(self):
+        other = next(member for member in self.members if member is not self.leader())
+        for read_from in ReadFrom:
+            with locus.connect([other.address], read_from=read_from) as client:
+                ack = client.apply(self.scene, UpdateBatch(tick=5))
+                result = client.query(self.scene, QueryBatch())
+                self.assertEqual((result.revision, result.age_ms), (ack.revision, 0))
