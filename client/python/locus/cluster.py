@@ -245,9 +245,9 @@ class ClusterConnection:
         if not self.moves(error):
             return error
         return LocusError(error.code, f"{error.message}; tried at {', '.join(self.routes.addresses)}: check that these "
-                          "servers run and that their PostgreSQL answers (Client.server().cluster shows both), and send "
-                          "again, or give it more time (timeout, retry, reconnect)", reason=error.reason,
-                          field=error.field, retry_after=error.retry_after, addresses=error.addresses, token=error.token)
+                          "servers run and that their PostgreSQL answers (Client.server().cluster shows both), or "
+                          "allow more time (timeout, retry, reconnect)", reason=error.reason, field=error.field,
+                          retry_after=error.retry_after, addresses=error.addresses, token=error.token)
 
     # Servers.
 

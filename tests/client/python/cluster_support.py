@@ -70,8 +70,9 @@ def wait_until(condition, seconds=START_SECONDS):
 class FakeMember:
     """Server in this process that answers as the member of a cluster would. `cluster` is shared by all members: a dict
     with `leader`, the address of the leader of every scene, `token`, `applied`, the ticks of the applied updates,
-    `numbers`, the highest number of each writer, `epoch`, and `down`, the errors of members that refuse everything, by
-    address.
+    `numbers`, the highest number of each writer, and `epoch`. It may have `followers`, their addresses; `down`, the codes
+    and reasons with which members refuse everything, by address; and `breaks`, which says of an applied batch whether the
+    call breaks instead of its ack.
     """
 
     def __init__(self, cluster):
@@ -133,11 +134,10 @@ class FakeMember:
         for raw in requests:
             request = UPDATES.request.FromString(raw)
             response = UPDATES.response(sequence=request.sequence)
-            if not self.cluster.get("loses", lambda batch: False)(request.batch):
-                self.apply_batch(request.batch, response)
-                if self.cluster.get("breaks", lambda batch: False)(request.batch):
-                    context.abort(grpc.StatusCode.UNAVAILABLE, "planned")
-                yield response.SerializeToString()
+            self.apply_batch(request.batch, response)
+            if not response.HasField("error") and self.cluster.get("breaks", lambda batch: False)(request.batch):
+                context.abort(grpc.StatusCode.UNAVAILABLE, "planned")
+            yield response.SerializeToString()
 
     def apply(self, raw, context):
         response = UPDATES.response()

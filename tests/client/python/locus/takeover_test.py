@@ -29,7 +29,7 @@ class TakeoverTest(unittest.TestCase):
         self.addCleanup(self.client.close)
         wait_until(lambda: len(self.client.server().cluster.members) >= 3)
         self.scene = self._testMethodName[:60].replace("_", "-").rstrip("-")
-        self.client.create_scene(self.scene)
+        self.client.create_scene(self.scene, followers=1)
 
     def start(self, name):
         member = Member(self.engine, name)
@@ -95,6 +95,34 @@ class TakeoverTest(unittest.TestCase):
         os.kill(frozen.process.pid, signal.SIGCONT)
         self.assertAppliedOnce(acks)
         self.assertNotEqual(self.leader().address, frozen.address)
+
+    def test_no_step_is_lost_or_applied_twice_when_the_leader_is_killed(self):
+        with self.client.query_stream(self.scene) as stream:
+            sent = []
+            for tick in range(1, AFTER + 1):
+                update = UpdateBatch(tick=tick).insert_balls([tick], [[tick, 0, 0]], 1)
+                sent.append(stream.step(update, QueryBatch().lookup([tick])))
+                if tick == LOST:
+                    self.leader().kill()
+            steps = [future.result(TAKEOVER_SECONDS) for future in sent]
+        self.assertEqual([listed(step.result.blocks[0].ids) for step in steps], [[tick] for tick in range(1, AFTER + 1)])
+        self.assertAppliedOnce([step.ack for step in steps])
+
+    def test_reads_of_any_server_never_go_back_while_leaders_are_killed(self):
+        stop = threading.Event()
+        readers = [self.reader(stop, read_from=read_from) for read_from in (ReadFrom.ANY, ReadFrom.FOLLOWER)]
+        try:
+            for tick in range(1, 21):
+                self.client.apply(self.scene, UpdateBatch(tick=tick, writer=7, number=tick))
+                if tick == 10:
+                    self.leader().kill()
+        finally:
+            stop.set()
+            for thread, _ in readers:
+                thread.join(WAIT_SECONDS)
+        for _, seen in readers:
+            self.assertEqual(seen, sorted(seen))
+            self.assertGreater(seen[-1], 10)
 
     def test_a_moved_scene_is_followed(self):
         first, other = self.leader(), None
