@@ -24,6 +24,7 @@ void add_up(const SceneFigures& scene, SceneFigures& sum) {
   sum.pinned_bytes += scene.pinned_bytes;
   sum.log_bytes += scene.log_bytes;
   sum.pending_changes += scene.pending_changes;
+  sum.leading += scene.leading;
 }
 
 struct Figure {
@@ -62,6 +63,14 @@ constexpr Figure kFigures[] = {
      &SceneFigures::pending_changes},
 };
 
+constexpr Figure kLeading = {"locus_scene_leading", "1 if this member of the cluster leads the scene, otherwise 0.",
+                             &SceneFigures::leading};
+
+void add_figure(const Figure& figure, const std::vector<SceneFigures>& scenes, MetricPage& page) {
+  page.begin(figure.name, figure.help, MetricKind::kGauge);
+  for (const SceneFigures& scene : scenes) page.add({{"scene", scene.name}}, static_cast<double>(scene.*figure.value));
+}
+
 }  // namespace
 
 std::vector<SceneFigures> SceneLabels::label(const std::vector<SceneFigures>& scenes) {
@@ -95,11 +104,9 @@ void SceneLabels::check_invariants() const {
 }
 
 void add_scene_figures(const std::vector<SceneFigures>& scenes, MetricPage& page) {
-  for (const Figure& figure : kFigures) {
-    page.begin(figure.name, figure.help, MetricKind::kGauge);
-    for (const SceneFigures& scene : scenes)
-      page.add({{"scene", scene.name}}, static_cast<double>(scene.*figure.value));
-  }
+  for (const Figure& figure : kFigures) add_figure(figure, scenes, page);
 }
+
+void add_led_scenes(const std::vector<SceneFigures>& scenes, MetricPage& page) { add_figure(kLeading, scenes, page); }
 
 }  // namespace locus::server

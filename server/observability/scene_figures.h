@@ -34,6 +34,7 @@ struct SceneFigures {
   uint64_t pinned_bytes = 0;
   uint64_t log_bytes = 0;
   uint64_t pending_changes = 0;
+  uint64_t leading = 0;  // 1 if this server is the scene's leader in a cluster, else 0
 };
 
 // The set of scenes that have a label. Invariant: at most `max` scenes have a label. A scene keeps its label until the
@@ -58,6 +59,9 @@ class SceneLabels {
 
 // Adds the figures to the page. `scenes` is a result of SceneLabels::label().
 void add_scene_figures(const std::vector<SceneFigures>& scenes, MetricPage& page);
+
+// Adds which of the scenes this server leads. Only for a member of a cluster.
+void add_led_scenes(const std::vector<SceneFigures>& scenes, MetricPage& page);
 
 }  // namespace locus::server
 

@@ -14,6 +14,7 @@
 #include "server/scheduling/clocks.h"
 #include "server/security/access_control.h"
 #include "server/security/rights.h"
+#include "server/services/cluster/cluster_scenes.h"
 #include "server/services/connections.h"
 #include "server/services/quota_report.h"
 
@@ -42,6 +43,8 @@ SceneFigures figures_of(const Host& host, const Scene& scene) {
   figures.pinned_bytes = status.pinned_bytes;
   figures.log_bytes = scene.log_position().bytes;
   figures.pending_changes = std::max(status.pending_changes, host.changes.pending(snapshot->epoch));
+  if (host.cluster != nullptr && host.cluster->placement_of(scene).role() == v1::SCENE_ROLE_LEADING)
+    figures.leading = 1;
   return figures;
 }
 
@@ -145,6 +148,26 @@ void add_storage(const Host& host, MetricPage& page) {
                MetricKind::kGauge, static_cast<double>(host.registry.damaged_scenes().size()));
 }
 
+// Adds the metrics that only a member of a cluster has.
+void add_cluster(const Host& host, MetricPage& page) {
+  const ClusterScenes::Figures figures = host.cluster->figures();
+  page.add_one("locus_cluster_members", "Living members of the cluster that this one knows, with itself.",
+               MetricKind::kGauge, static_cast<double>(figures.members));
+  page.add_one("locus_cluster_leading", "Scenes that this member leads.", MetricKind::kGauge,
+               static_cast<double>(figures.leading));
+  page.add_one("locus_cluster_leaderships_total",
+               "Leaderships that began here: scenes created, moved here or taken over.", MetricKind::kCounter,
+               static_cast<double>(figures.begun));
+  page.add_one("locus_cluster_fenced_total", "Leaderships that ended because another member took the scene over.",
+               MetricKind::kCounter, static_cast<double>(figures.fenced));
+  page.add_one("locus_cluster_engine_up", "1 if the engine answered this member's last beat, otherwise 0.",
+               MetricKind::kGauge, figures.engine_answers ? 1 : 0);
+  page.begin("locus_cluster_append_seconds",
+             "Time from an append of updates to the engine's acknowledgement, with the wait for its transaction.",
+             MetricKind::kHistogram);
+  page.add({}, figures.appends);
+}
+
 void add_file_loads(const Host& host, MetricPage& page) {
   const std::pair<const char*, const FileLoads&> all[] = {{"access", host.access_loads}, {"tls", host.tls_loads}};
   page.begin("locus_file_reloads_total",
@@ -240,7 +263,12 @@ std::string Scrape::metrics() {
   std::vector<SceneFigures> scenes;
   for (const ScenePtr& scene : host_.registry.list_scenes("", std::numeric_limits<size_t>::max()))
     scenes.push_back(figures_of(host_, *scene));
-  add_scene_figures(labels_.label(scenes), page);
+  const std::vector<SceneFigures> labelled = labels_.label(scenes);
+  add_scene_figures(labelled, page);
+  if (host_.cluster != nullptr) {
+    add_led_scenes(labelled, page);
+    add_cluster(host_, page);
+  }
   add_process_figures(read_process(addresses_), page);
   return page.text();
 }

@@ -148,6 +148,7 @@ void PostgresLog::lead(const StoredScene& scene, uint64_t member, uint64_t token
 }
 
 absl::StatusOr<uint64_t> PostgresLog::append(SceneKey key, absl::Span<const LogEntry> entries, AckLevel) {
+  const auto start = std::chrono::steady_clock::now();
   ASSIGN_OR_RETURN(const LedPtr state, led(key));
   Led& scene = *state;
   {
@@ -187,6 +188,7 @@ absl::StatusOr<uint64_t> PostgresLog::append(SceneKey key, absl::Span<const LogE
       scene.last += entries.size();
       scene.chain = chain;
       scene.known_last = scene.last;
+      if (options_.on_append) options_.on_append(std::chrono::steady_clock::now() - start);
       return scene.last;
     case Append::Outcome::kFenced:
       set_fenced(scene);

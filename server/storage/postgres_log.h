@@ -76,6 +76,9 @@ struct PostgresOptions {
   // reason. `on_token`: this daemon leads on with the token `now`, because it had to remove a lost append.
   std::function<void(SceneKey, uint64_t token)> on_fenced;
   std::function<void(SceneKey, uint64_t before, uint64_t now)> on_token;
+  // Called with the time that an acknowledged append took, by its thread, before append() returns. The scene's lock is
+  // held, so the function must not call the log.
+  std::function<void(std::chrono::nanoseconds)> on_append;
 };
 
 class PostgresLog final : public UpdateLog {

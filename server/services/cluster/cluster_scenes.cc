@@ -71,6 +71,7 @@ ClusterScenes::ClusterScenes(Host& host, ClusterStorage& storage, const std::str
       log_(*storage.log),
       address_(address),
       engine_hosts_(storage.hosts),
+      appends_(*storage.appends),
       directory_(*storage.log, *storage.engine),
       member_(*storage.engine, *this, options_of(host, address)),
       readers_(std::make_unique<ChangeQueue>(kReaders, kMaxJobs)) {}
@@ -486,8 +487,11 @@ v1::Cluster ClusterScenes::describe() {
   return cluster;
 }
 
-ClusterScenes::Figures ClusterScenes::figures() const {
-  return {member_.leading(), begun_.load(), fenced_.load(), member_.engine_answers()};
+ClusterScenes::Figures ClusterScenes::figures() {
+  Figures figures{member_.leading(), begun_.load(), fenced_.load(), member_.engine_answers(), 0, {}};
+  figures.members = directory_.known_members().size();
+  appends_.add_to(figures.appends);
+  return figures;
 }
 
 void ClusterScenes::write_snapshots(steady_clock::time_point deadline) {

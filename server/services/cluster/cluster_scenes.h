@@ -24,6 +24,7 @@
 #include "locus/v1/view.pb.h"
 #include "server/cluster/cluster_member.h"
 #include "server/host/host.h"
+#include "server/observability/latency_histogram.h"
 #include "server/scheduling/change_queue.h"
 #include "server/services/cluster/cluster_storage.h"
 #include "server/services/cluster/scene_directory.h"
@@ -41,6 +42,8 @@ class ClusterScenes final : public ClusterHost {
     uint64_t begun = 0;   // leaderships begun: scenes created, moved here or taken over
     uint64_t fenced = 0;  // leaderships that ended because another member took over
     bool engine_answers = false;
+    uint64_t members = 0;   // living members as last read, with this one
+    LatencyCounts appends;  // times of acknowledged appends to the engine
   };
 
   // `host` and `storage` must outlive this object. `address` is where the others reach this daemon.
@@ -96,7 +99,7 @@ class ClusterScenes final : public ClusterHost {
   v1::ScenePlacement placement_of(const Scene& scene) const;
   v1::ScenePlacement placement_of(const CatalogueScene& row) const;
   v1::Cluster describe();
-  Figures figures() const;
+  Figures figures();
   // Returns the page of the cluster's scenes after `after`. Waits for the engine.
   absl::StatusOr<std::vector<CatalogueScene>> list(const std::string& after, size_t limit) {
     (void)directory_.members();  // so that the leaders' addresses are known
@@ -141,6 +144,7 @@ class ClusterScenes final : public ClusterHost {
   PostgresLog& log_;
   const std::string address_;
   const std::string engine_hosts_;
+  const LatencyHistogram& appends_;
   const ClusterTiming timing_;
   const ClusterClock clock_ = &time_since_boot;
   SceneDirectory directory_;

@@ -9,6 +9,7 @@
 #include "absl/status/statusor.h"
 #include "core/base/mutex.h"
 #include "server/config/server_config.h"
+#include "server/observability/latency_histogram.h"
 #include "server/storage/postgres_cluster.h"
 #include "server/storage/postgres_log.h"
 
@@ -44,7 +45,9 @@ class LogNotices {
 };
 
 struct ClusterStorage {
-  std::unique_ptr<LogNotices> notices;  // before the log, which calls it
+  // Before the log, which uses both.
+  std::unique_ptr<LogNotices> notices;
+  std::unique_ptr<LatencyHistogram> appends;  // times of acknowledged appends
   std::unique_ptr<PostgresLog> log;
   std::unique_ptr<PostgresCluster> engine;
   std::string hosts;  // of the engine, without user and password

@@ -71,5 +71,18 @@ TEST(SceneFiguresTest, AThousandScenesMakeNoMoreLabelsThanTheLimit) {
   EXPECT_THAT(text, HasSubstr("locus_scene_objects{scene=\"_other\"} 9000\n"));
 }
 
+TEST(SceneFiguresTest, LedScenesAreShownOnTheirOwnAndCountedAmongTheOthers) {
+  std::vector<SceneFigures> scenes = scenes_named({"a", "b", "c", "d"});
+  scenes[0].leading = scenes[2].leading = scenes[3].leading = 1;
+  SceneLabels labels(2);
+  MetricPage with, without;
+  const std::vector<SceneFigures> shown = labels.label(scenes);
+  add_led_scenes(shown, with);
+  EXPECT_THAT(with.text(), HasSubstr("locus_scene_leading{scene=\"a\"} 1\nlocus_scene_leading{scene=\"b\"} 0\n"
+                                     "locus_scene_leading{scene=\"_other\"} 2\n"));
+  add_scene_figures(shown, without);
+  EXPECT_THAT(without.text(), testing::Not(HasSubstr("leading"))) << "a server without a cluster leads nothing";
+}
+
 }  // namespace
 }  // namespace locus::server
