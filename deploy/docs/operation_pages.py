@@ -67,14 +67,14 @@ def value_cell(value):
 
 
 def labels_by_metric(readme):
-    """Returns labels and unit of each metric, from the table of deploy/dashboards/README.md. A name that begins with an
-    underscore goes on after locus_scene.
+    """Returns labels, unit and meaning of each metric, from the table of deploy/dashboards/README.md. A name that begins
+    with an underscore goes on after locus_scene.
     """
     found = {}
     for line in readme.split("\n"):
         cells = [cell.strip() for cell in line.strip("|").split("|")]
         for name in re.findall(r"`([\w*]+)`", cells[0]) if line.startswith("| `") and len(cells) == 4 else ():
-            found["locus_scene" + name if name.startswith("_") else name] = (cells[1], cells[2])
+            found["locus_scene" + name if name.startswith("_") else name] = (cells[1], cells[2], cells[3])
     return found
 
 
@@ -83,23 +83,33 @@ def family_name(family):
     return family.name + ("_total" if family.type == "counter" else "")
 
 
+def cluster_metrics(known):
+    """Returns name, type and meaning of the metrics that a daemon without a cluster, such as that of this page, lacks."""
+    for name, (_, unit, meaning) in known.items():
+        if meaning.startswith("in a cluster: "):
+            kind = "histogram" if "histogram" in unit else "counter" if name.endswith("_total") else "gauge"
+            yield name, kind, meaning[0].upper() + meaning[1:] + "."
+
+
 def metrics(source, binaries):
     """Returns the page of metrics, with names, types and help of a running daemon."""
     known = labels_by_metric(read(source, "deploy/dashboards/README.md"))
     with daemon.Daemon(binaries) as running:
         families = list(text_string_to_metric_families(running.metrics()))
+    shown = [(family_name(family), family.type, family.documentation) for family in families]
+    shown += cluster_metrics(known)
     text = ("# Metrics\n\n"
             "locusd serves them on `/metrics` of its HTTP port (127.0.0.1:7576 by default) in the text format of Prometheus. The "
             "first 100 scenes have a label of their own, and the others are summed as `_other`. A histogram has the series "
-            "`_bucket`, `_sum` and `_count`.\n")
-    for family in sorted(families, key=lambda family: family.name):
-        name = family_name(family)
-        labels, unit = known.get(name, known["process_*"] if name.startswith("process_") else ("", ""))
-        facts = [family.type, "labels " + ", ".join(f"`{label}`" for label in labels.split(", ")) if labels else "no labels"]
+            "`_bucket`, `_sum` and `_count`. Only a member of a cluster has the metrics whose text begins with *in a "
+            "cluster*.\n")
+    for name, kind, meaning in sorted(shown):
+        labels, unit, _ = known.get(name, known["process_*"] if name.startswith("process_") else ("", "", ""))
+        facts = [kind, "labels " + ", ".join(f"`{label}`" for label in labels.split(", ")) if labels else "no labels"]
         of_one = not unit or unit.startswith(("0", "1")) or name.startswith("process_")
         facts += [] if of_one else ["unit: " + unit.replace(", histogram", "")]
         term = f"[`{name}`](#{name}){{#{name}}} {', '.join(facts)}"
-        text += markdown.definition(term, markdown.markdown_of(family.documentation))
+        text += markdown.definition(term, markdown.markdown_of(meaning))
     return text
 
 
