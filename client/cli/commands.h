@@ -34,6 +34,7 @@ void add_verify_command(CLI::App& parent, Context& context);
 void add_wait_command(CLI::App& parent, Context& context);
 void add_bench_command(CLI::App& parent, Context& context);
 void add_top_command(CLI::App& parent, Context& context);
+void add_cluster_command(CLI::App& parent, Context& context);
 void add_limits_command(CLI::App& parent, Context& context);
 void add_quota_command(CLI::App& parent, Context& context);
 void add_health_command(CLI::App& parent, Context& context);

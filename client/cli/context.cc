@@ -17,7 +17,7 @@ absl::StatusOr<client::Client*> Context::connect() {
   return client_.get();
 }
 
-absl::StatusOr<std::unique_ptr<client::Client>> Context::open_connection() const {
+absl::StatusOr<std::unique_ptr<client::Client>> Context::open_connection(const std::string& address) const {
   RETURN_IF_ERROR(connection_mistake_);
   client::ClientOptions options;
   options.credentials = options_.connection.credentials;
@@ -28,10 +28,10 @@ absl::StatusOr<std::unique_ptr<client::Client>> Context::open_connection() const
     options.long_deadline = timeout;
     options.backup_deadline = timeout;
   }
-  absl::StatusOr<std::unique_ptr<client::Client>> client = client::Client::connect(address(), options);
+  absl::StatusOr<std::unique_ptr<client::Client>> client = client::Client::connect(address, options);
   if (absl::IsUnavailable(client.status()) && absl::StrContains(client.status().message(), "nothing answers")) {
     return absl::UnavailableError(
-        absl::StrCat("nothing answers at ", address(), ": start one with `locusd`, or give --address"));
+        absl::StrCat("nothing answers at ", address, ": start one with `locusd`, or give --address"));
   }
   return client;
 }

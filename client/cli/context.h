@@ -70,7 +70,9 @@ class Context {
   void cancel_calls();
 
   // Opens a further connection to address(), for commands that measure with several. Errors as those of connect().
-  absl::StatusOr<std::unique_ptr<client::Client>> open_connection() const;
+  absl::StatusOr<std::unique_ptr<client::Client>> open_connection() const { return open_connection(address()); }
+  // Opens a connection to another server, with the same credentials and timeouts. Errors as those of connect().
+  absl::StatusOr<std::unique_ptr<client::Client>> open_connection(const std::string& address) const;
 
   // Writes `report` to out() in the format of options().
   void write(const Report& report);

@@ -162,6 +162,7 @@ void build_cli(CLI::App& app, Context& context) {
   add_demo_command(app, context);
   add_bench_command(app, context);
   add_top_command(app, context);
+  add_cluster_command(app, context);
   add_limits_command(app, context);
   add_quota_command(app, context);
   add_health_command(app, context);

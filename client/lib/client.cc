@@ -215,6 +215,11 @@ absl::StatusOr<BackupSize> Client::backup(BackupSink& sink) const {
   return download_backup(*server, sink, connection_->bulk_header(connection_->options.backup_deadline));
 }
 
+absl::StatusOr<v1::MoveSceneResponse> Client::move_scene(const v1::MoveSceneRequest& request) const {
+  return call(*connection_->servers, connection_->once(request.scene()), request,
+              &v1::ServerService::StubInterface::MoveScene);
+}
+
 absl::StatusOr<v1::Scene> Client::create_scene(const v1::CreateSceneRequest& request) const {
   ASSIGN_OR_RETURN(v1::CreateSceneResponse response, call(*connection_->scenes, connection_->once(request.name()),
                                                           request, &v1::SceneService::StubInterface::CreateScene));

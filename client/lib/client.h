@@ -96,6 +96,10 @@ class Client {
   // UNIMPLEMENTED if the server has no data directory.
   absl::StatusOr<BackupSize> backup(BackupSink& sink) const;
 
+  // Moves the leadership of a scene to another member of the server's cluster. Call it at the leader: any other server
+  // refuses with REASON_ELSEWHERE, and error_of() has the leader's address. Not retried.
+  absl::StatusOr<v1::MoveSceneResponse> move_scene(const v1::MoveSceneRequest& request) const;
+
   // Create, read, list, change and delete scenes. Reading and listing are retried; the others are not.
   // list_scenes() reads all pages and returns every scene that has all of `labels`.
   absl::StatusOr<v1::Scene> create_scene(const v1::CreateSceneRequest& request) const;

@@ -71,6 +71,7 @@ ALLOWED = {
     "client/cli/extras/bench": ["client/cli", "client/cli/extras/demo", "client/lib", "core/geometry", "core/base"],
     "client/cli/extras/completion": ["client/cli"],
     "client/cli/extras/top": ["client/cli", "client/lib", "core/base"],
+    "client/cli/extras/cluster": ["client/cli", "client/lib", "core/base"],
     "client/cli/extras/verify": ["client/cli/levels/generate", "client/lib"],
     # The structures of the library are timed in the command line, on a scene's own values.
     "client/cli/extras/tune/structures": ["core/index/*", "core/geometry", "core/base"],

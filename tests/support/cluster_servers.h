@@ -20,8 +20,9 @@ namespace locus::test {
 // One member.
 class ClusterServer {
  public:
-  ClusterServer(const PostgresServer& engine, const std::string& zone) {
+  ClusterServer(const PostgresServer& engine, const std::string& zone, const std::string& http_listen = "") {
     server::ServerConfig config = test_config();
+    config.http_listen = http_listen;
     config.cluster = engine.options().url;
     config.engine_replication = server::ReplicatedBy::kStorage;
     config.zone = zone;

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <memory>
@@ -12,6 +13,7 @@
 #include "client/cli/choices.h"
 #include "client/cli/commands.h"
 #include "client/cli/default_scene.h"
+#include "client/cli/extras/cluster/cluster_facts.h"
 #include "client/cli/failure.h"
 #include "client/cli/output.h"
 #include "core/base/status_macros.h"
@@ -82,6 +84,26 @@ Json scene_summary(const v1::Scene& scene) {
           {"past_bytes", scene.history_bytes() + scene.recent_bytes()}};
 }
 
+// Returns whether the server has the scene. In a cluster, it describes other scenes by their name and leader only.
+bool has_figures(const v1::Scene& scene) {
+  const v1::ScenePlacement& placement = scene.placement();
+  return !scene.has_placement() || placement.role() == v1::SCENE_ROLE_LEADING ||
+         placement.role() == v1::SCENE_ROLE_FOLLOWING ||
+         (placement.role() == v1::SCENE_ROLE_NO_LEADER && !placement.leader().empty());
+}
+
+// Adds the leader of a scene, if the server belongs to a cluster, and removes figures that the server does not know.
+void add_leader(const v1::Scene& scene, Json& json) {
+  if (!scene.has_placement()) return;
+  if (!has_figures(scene)) {
+    for (auto& [key, value] : json.items())
+      if (key != "name" && key != "state") value = nullptr;
+  }
+  const v1::ScenePlacement& placement = scene.placement();
+  json["role"] = role_name(placement.role());
+  json["leader"] = placement.leader().empty() ? Json() : Json(placement.leader());
+}
+
 // Returns the reason why the history does not reach further back, such as "bytes".
 std::string limit_name(v1::HistoryLimit limit) {
   return absl::AsciiStrToLower(absl::StripPrefix(v1::HistoryLimit_Name(limit), "HISTORY_LIMIT_"));
@@ -103,6 +125,8 @@ Json corner_of(bool present, const v1::Vec3d& corner) {
 Report description_of(const v1::Scene& scene) {
   Report report;
   report.head = scene_summary(scene);
+  add_leader(scene, report.head);
+  if (scene.has_placement()) report.head["token"] = scene.placement().token();
   report.head["epoch"] = id_json(scene.epoch());
   report.head["min"] = corner_of(scene.has_min(), scene.min());
   report.head["max"] = corner_of(scene.has_max(), scene.max());
@@ -180,7 +204,13 @@ absl::Status list_scenes(const ListOptions& options, Context& context) {
   report.no_rows = "no scenes";
   const Json columns = scene_summary({});
   for (const auto& [key, value] : columns.items()) report.keys.push_back(key);
-  for (const v1::Scene& scene : scenes) report.rows.push_back(scene_summary(scene));
+  const bool in_cluster =
+      std::any_of(scenes.begin(), scenes.end(), [](const v1::Scene& scene) { return scene.has_placement(); });
+  if (in_cluster) report.keys.insert(report.keys.end(), {"role", "leader"});
+  for (const v1::Scene& scene : scenes) {
+    report.rows.push_back(scene_summary(scene));
+    add_leader(scene, report.rows.back());
+  }
   context.write(report);
   return absl::OkStatus();
 }
@@ -301,7 +331,9 @@ void add_list(CLI::App& parent, Context& context) {
   CLI::App& command = *parent.add_subcommand("list", "List the scenes of the server");
   command.footer(
       "memory_bytes is the memory of the objects and instances, mesh_bytes that of the placed meshes, which scenes\n"
-      "share, and past_bytes at most that of the history and of recent revisions.\n"
+      "share, and past_bytes at most that of the history and of recent revisions. A server of a cluster lists the\n"
+      "scenes of all members: role is its own (leading, elsewhere, no_leader), leader the address of the leader. Of\n"
+      "scenes that it does not have it knows no figures.\n"
       "Examples:\n  locus scene list\n  locus -o ndjson scene list --label mode=ctf");
   add_repeatable(command, "--label", options->labels, "KEY=VALUE", "Only scenes with this label");
   run_when_chosen(command, options, context, list_scenes);
@@ -314,6 +346,7 @@ void add_describe(CLI::App& parent, Context& context) {
   command.footer(
       "Of the history, limited_by says why it does not reach further back: ticks (as asked for), bytes (more ticks\n"
       "did not fit into --history-bytes), memory (the server was short of it), began or restored.\n"
+      "In a cluster, token is the number of the leadership: each new leader has a higher one.\n"
       "costs are those of queries, by kind: nanoseconds and work (nodes, cells and tests) of one query.\n"
       "Examples:\n  locus scene get arena\n  locus -o json scene get arena\n  locus scene describe arena");
   add_scene_argument(command, options->name);

@@ -13,6 +13,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <string>
 #include <thread>
@@ -298,6 +299,7 @@ class FakeServerService final : public v1::ServerService::Service {
     limit.set_value(1024);
     limit.set_used(2);
     limit.set_refused(3);
+    if (cluster) *response->mutable_cluster() = *cluster;
     return grpc::Status::OK;
   }
 
@@ -352,6 +354,7 @@ class FakeServerService final : public v1::ServerService::Service {
 
   std::vector<v1::BackupResponse> backup_pieces;
   grpc::Status backup_end;
+  std::optional<v1::Cluster> cluster;  // nullopt: the server belongs to none
 };
 
 // Ways of a client to a fake server. Tests of the library run over both.

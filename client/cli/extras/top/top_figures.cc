@@ -88,6 +88,18 @@ Json quantile_ms(const Buckets& buckets, double share) {
   return nullptr;
 }
 
+// Adds the members and the engine, if the server belongs to a cluster.
+void add_cluster(const MetricSamples& before, const MetricSamples& now, Json& server) {
+  const std::map<std::string, double> members = by_label(now, "locus_cluster_members", "");
+  if (members.empty()) return;
+  const Buckets appends = minus(buckets_of(now, "locus_cluster_append_seconds_bucket", {}),
+                                buckets_of(before, "locus_cluster_append_seconds_bucket", {}));
+  server["members"] = number(sum_of(now, "locus_cluster_members"));
+  server["leading"] = number(sum_of(now, "locus_cluster_leading"));
+  server["engine_up"] = sum_of(now, "locus_cluster_engine_up") == 1;
+  server["append_p99_ms"] = quantile_ms(appends, 0.99);
+}
+
 Json server_of(const MetricSamples& before, const MetricSamples& now, double seconds) {
   const std::map<std::string, double> limits = by_label(now, "locus_limit", "limit");
   const std::map<std::string, double> used = by_label(now, "locus_limit_used", "limit");
@@ -106,6 +118,7 @@ Json server_of(const MetricSamples& before, const MetricSamples& now, double sec
   server["updates_per_s"] = rate_of("locus_update_items_total");
   server["update_lag_p99_ms"] = quantile_ms(lag, 0.99);
   server["refusals_per_s"] = rate_of("locus_refusals_total");
+  add_cluster(before, now, server);
   return server;
 }
 
@@ -139,12 +152,19 @@ std::vector<Json> queries_of(const MetricSamples& before, const MetricSamples& n
   return rows;
 }
 
+// Returns the role of the server for a scene; null for the sum of several scenes.
+Json role_of(const std::string& scene, double leading) {
+  if (scene == "_other") return nullptr;
+  return leading == 1 ? "leading" : "no_leader";
+}
+
 std::vector<Json> scenes_of(const MetricSamples& before, const MetricSamples& now, double seconds) {
   std::vector<Json> rows;
   const std::map<std::string, double> old_revisions = by_label(before, "locus_scene_revision", "scene");
   std::map<std::string, std::map<std::string, double>> figures;
   for (const char* name : {"objects", "instances", "memory_bytes", "history_ticks", "history_bytes", "pinned_bytes"})
     figures[name] = by_label(now, std::string("locus_scene_") + name, "scene");
+  const std::map<std::string, double> leading = by_label(now, "locus_scene_leading", "scene");
   for (const auto& [scene, revision] : by_label(now, "locus_scene_revision", "scene")) {
     const double old = old_revisions.contains(scene) ? at(old_revisions, scene) : revision;
     rows.push_back({{"scene", scene},
@@ -156,6 +176,7 @@ std::vector<Json> scenes_of(const MetricSamples& before, const MetricSamples& no
                     {"history_ticks", number(at(figures["history_ticks"], scene))},
                     {"history_bytes", number(at(figures["history_bytes"], scene))},
                     {"pinned_bytes", number(at(figures["pinned_bytes"], scene))}});
+    if (!leading.empty()) rows.back()["role"] = role_of(scene, at(leading, scene));
   }
   return rows;
 }

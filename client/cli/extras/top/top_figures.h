@@ -12,10 +12,10 @@
 namespace locus::cli {
 
 struct TopFigures {
-  Json server;                // one object: memory_bytes, connections, queue ...
+  Json server;                // one object: memory_bytes, connections, queue ...; in a cluster members, engine_up ...
   std::vector<Json> rpcs;     // one row per rpc called between the scrapes: rpc, per_s, p50_ms, p99_ms
   std::vector<Json> queries;  // one row per kind of query: kind, per_s, us_each
-  std::vector<Json> scenes;   // one row per scene: scene, revisions_per_s, objects, memory_bytes ...
+  std::vector<Json> scenes;   // one row per scene: scene, revisions_per_s, objects, memory_bytes ...; in a cluster role
 };
 
 // Returns the figures of the interval between two scrapes. `seconds` is the length of the interval.

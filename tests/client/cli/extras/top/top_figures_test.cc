@@ -72,5 +72,36 @@ TEST(TopFiguresTest, AnEmptyPageGivesNoRows) {
   EXPECT_EQ(figures.server["ready"], false);
 }
 
+TEST(TopFiguresTest, AMemberOfAClusterShowsItsRolesMembersAndEngine) {
+  const TopFigures figures = top_figures(samples("locus_cluster_append_seconds_bucket{le=\"0.001\"} 0\n"
+                                                 "locus_cluster_append_seconds_bucket{le=\"+Inf\"} 0\n"),
+                                         samples("locus_scene_revision{scene=\"arena\"} 70\n"
+                                                 "locus_scene_revision{scene=\"yard\"} 2\n"
+                                                 "locus_scene_revision{scene=\"_other\"} 9\n"
+                                                 "locus_scene_leading{scene=\"arena\"} 1\n"
+                                                 "locus_scene_leading{scene=\"yard\"} 0\n"
+                                                 "locus_scene_leading{scene=\"_other\"} 3\n"
+                                                 "locus_cluster_members 3\nlocus_cluster_leading 4\n"
+                                                 "locus_cluster_engine_up 0\n"
+                                                 "locus_cluster_append_seconds_bucket{le=\"0.001\"} 100\n"
+                                                 "locus_cluster_append_seconds_bucket{le=\"+Inf\"} 100\n"),
+                                         1);
+  ASSERT_EQ(figures.scenes.size(), 3u);
+  EXPECT_EQ(figures.scenes[0]["role"], nullptr) << "the sum over several scenes";
+  EXPECT_EQ(figures.scenes[1]["role"], "leading");
+  EXPECT_EQ(figures.scenes[2]["role"], "no_leader");
+  EXPECT_EQ(figures.server["members"], 3);
+  EXPECT_EQ(figures.server["leading"], 4);
+  EXPECT_EQ(figures.server["engine_up"], false);
+  EXPECT_EQ(figures.server["append_p99_ms"], 0.99);
+}
+
+TEST(TopFiguresTest, AServerWithoutAClusterShowsNothingOfOne) {
+  const TopFigures figures = top_figures({}, samples("locus_scene_revision{scene=\"arena\"} 70\nlocus_ready 1\n"), 1);
+  EXPECT_FALSE(figures.scenes[0].contains("role"));
+  for (const char* const key : {"members", "leading", "engine_up", "append_p99_ms"})
+    EXPECT_FALSE(figures.server.contains(key)) << key;
+}
+
 }  // namespace
 }  // namespace locus::cli
