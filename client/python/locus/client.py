@@ -66,10 +66,11 @@ def connect(address: Union[str, Sequence[str]] = DEFAULT_ADDRESS, *, timeout: Op
     one. The client also connects to servers that these name, with the same credentials. `read_from`: the servers of a
     cluster that answer queries. connect() succeeds when one of the addresses answers.
 
-    `timeout`: maximum duration of a call in seconds, including retries, by default 10, for a cluster 30; `retry`: policy
-    of retries, by default Retry(), for a cluster one that lasts 20 s, longer than a takeover; `long_timeout`: maximum duration, in seconds,
-    of mesh transfers and changes of instances. With `wait_for_server`, connect() retries until `timeout` seconds have
-    passed; without it, a refused connection fails immediately with LocusError UNAVAILABLE, which names the address.
+    `timeout`: maximum duration of a call in seconds, including retries, by default 10, for a cluster 30; `retry`:
+    policy of retries, by default Retry(), for a cluster one that lasts 20 s, longer than a takeover; `long_timeout`:
+    maximum duration, in seconds, of mesh transfers and changes of instances. With `wait_for_server`, connect() retries
+    until `timeout` seconds have passed; without it, a refused connection fails immediately with LocusError UNAVAILABLE,
+    which names the address.
     `max_send_bytes`, `max_receive_bytes`: maximum message sizes; the server accepts 32 MiB by default, and an answer
     may have up to the batch's `max_reply_bytes`.
 

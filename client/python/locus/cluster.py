@@ -27,6 +27,7 @@ _RESULT_IN_RESPONSE = schema.numbers("QueryResponse")["result"]
 _RESULT = schema.numbers("QueryResult")
 # Reasons of a server that has done nothing, while another one, or the same one later, may do it.
 _ELSEWHERE = (Reason.ELSEWHERE, Reason.NO_LEADER, Reason.DRAINING, Reason.RECOVERING)
+_LOST = (grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.CANCELLED)
 _Answer = TypeVar("_Answer")
 
 
@@ -225,8 +226,10 @@ class ClusterConnection:
         return self._note(scene, used.address, error, None)
 
     def moves(self, error: LocusError) -> bool:
-        """Returns True if a request that was answered by this error may succeed at another server, or later."""
-        return error.reason in _ELSEWHERE or (error.code == grpc.StatusCode.UNAVAILABLE and not error.refused)
+        """Returns True if a request that was answered by this error may succeed at another server, or later. A server that
+        ends cancels calls.
+        """
+        return error.reason in _ELSEWHERE or (error.code in _LOST and not error.refused)
 
     def reading(self, scene: str, names_revision: bool, leader_only: bool) -> Reading:
         """Returns the choice of the server and of the revision for a query."""

@@ -1,7 +1,7 @@
 """gRPC channel to one locusd: addresses, deadlines and retries. Internal to the package.
 
-The methods of Connection that Client and the streams call are also those of ClusterConnection (cluster.py), which chooses a server
-for each call.
+The methods of Connection that Client and the streams call are also those of ClusterConnection (cluster.py), which chooses a
+server for each call.
 """
 from __future__ import annotations
 

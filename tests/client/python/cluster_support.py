@@ -56,14 +56,15 @@ def wait_until(condition, seconds=START_SECONDS):
     """Waits until condition() is true and returns its value. An error of a server counts as false."""
     until = time.monotonic() + seconds
     while True:
+        value, error = None, None
         try:
             value = condition()
-        except locus.LocusError:
-            value = None
+        except locus.LocusError as failure:
+            error = failure
         if value:
             return value
         if time.monotonic() > until:
-            raise AssertionError("the condition did not become true in time")
+            raise AssertionError(f"the condition did not become true in time: {value!r} {error}")
         time.sleep(0.05)
 
 
