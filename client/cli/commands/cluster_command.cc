@@ -29,10 +29,12 @@ struct ClusterStatusOptions {
 struct ClusterMoveOptions {
   std::string scene;
   std::string address;  // empty = the server chooses
+  bool with_memory = false;
 };
 
 struct ClusterDrainOptions {
   std::string address;
+  bool with_memory = false;
 };
 
 struct RebalanceOptions {
@@ -47,6 +49,8 @@ absl::Status engine_is_away(const v1::Cluster& cluster) {
   return absl::FailedPreconditionError(
       absl::StrCat("the engine ", cluster.engine(), " does not answer this member: scenes cannot be listed or moved"));
 }
+
+MemoryScenes memory_scenes(bool with_memory) { return with_memory ? MemoryScenes::kMove : MemoryScenes::kStay; }
 
 // Returns the cluster whose engine answers, or an error.
 absl::StatusOr<v1::Cluster> working_cluster(const client::Client& client) {
@@ -74,7 +78,8 @@ absl::Status move_leadership(const ClusterMoveOptions& options, Context& context
   ASSIGN_OR_RETURN(client::Client* const client, context.connect());
   RETURN_IF_ERROR(read_cluster(*client).status());
   ClusterConnections connections(context);
-  ASSIGN_OR_RETURN(const v1::MoveSceneResponse moved, connections.move(options.scene, options.address));
+  ASSIGN_OR_RETURN(const v1::MoveSceneResponse moved,
+                   connections.move(options.scene, options.address, memory_scenes(options.with_memory)));
   Report report;
   report.head = {{"scene", options.scene}, {"leader", moved.leader()}, {"token", moved.token()}};
   context.acknowledge(report, absl::StrCat("moved ", options.scene, " to ", moved.leader()));
@@ -95,26 +100,25 @@ struct Drained {
   std::map<std::string, std::string> why;
 };
 
-// Moves the scenes that the member leads now. Returns how many it led.
-absl::StatusOr<size_t> drain_once(const std::string& address, const client::Client& client,
+// Moves the scenes that the member leads now. Returns how many it tried to move.
+absl::StatusOr<size_t> drain_once(const ClusterDrainOptions& options, const client::Client& client,
                                   ClusterConnections& connections, ProgressWriter& progress, Drained& drained) {
   ASSIGN_OR_RETURN(const v1::Cluster cluster, working_cluster(client));
-  const std::vector<std::string> targets = addresses_taking_scenes(cluster, address);
+  const std::vector<std::string> targets = addresses_taking_scenes(cluster, options.address);
   if (targets.empty()) return absl::FailedPreconditionError("the cluster has no other member that takes scenes");
   ASSIGN_OR_RETURN(const std::vector<LedScene> scenes, read_led_scenes(client));
   std::vector<std::string> addresses = targets;
-  addresses.push_back(address);
-  std::vector<MemberLoad> loads = read_loads(connections, scenes, addresses, progress);
+  addresses.push_back(options.address);
+  std::vector<MemberLoad> loads =
+      read_loads(connections, scenes, addresses, memory_scenes(options.with_memory), progress);
   MemberLoad source = std::move(loads.back());
   loads.pop_back();
-  const auto led = static_cast<size_t>(
-      std::count_if(scenes.begin(), scenes.end(), [&](const LedScene& scene) { return scene.leader == address; }));
   make_moves(connections, plan_drain(source, std::move(loads)), progress,
              [&](const PlannedMove& move, const absl::Status& outcome) {
                drained.moved += outcome.ok() ? 1 : 0;
-               drained.why[move.scene] = outcome.message();
+               drained.why[move.scene] = std::string(outcome.message());
              });
-  return led;
+  return source.scenes.size();
 }
 
 // Reports the scenes that the member still leads.
@@ -128,7 +132,11 @@ absl::Status report_drain(const std::string& address, const client::Client& clie
     if (scene.leader != address) continue;
     const auto why = drained.why.find(scene.name);
     const bool failed = why != drained.why.end() && !why->second.empty();
-    report.rows.push_back({{"scene", scene.name}, {"why", failed ? why->second : "it came after the others left"}});
+    report.rows.push_back(
+        {{"scene", scene.name},
+         {"why", failed            ? why->second
+                 : scene.in_memory ? "it is in memory only: --with-memory moves it without its objects"
+                                   : "it came or was being read meanwhile"}});
   }
   report.head = {{"address", address}, {"moved", drained.moved}};
   if (report.rows.empty()) {
@@ -154,8 +162,8 @@ absl::Status drain_member(const ClusterDrainOptions& options, Context& context) 
   ProgressWriter progress = start_progress(context);
   Drained drained;
   for (int pass = 0; pass < kPasses; ++pass) {
-    ASSIGN_OR_RETURN(const size_t led, drain_once(options.address, *client, connections, progress, drained));
-    if (led == 0) break;
+    ASSIGN_OR_RETURN(const size_t tried, drain_once(options, *client, connections, progress, drained));
+    if (tried == 0) break;
   }
   progress.hide();
   return report_drain(options.address, *client, drained, context);
@@ -176,8 +184,8 @@ absl::Status rebalance_scenes(const RebalanceOptions& options, Context& context)
   ASSIGN_OR_RETURN(const std::vector<LedScene> scenes, read_led_scenes(*client));
   ClusterConnections connections(context);
   ProgressWriter progress = start_progress(context);
-  const RebalancePlan plan =
-      plan_rebalance(read_loads(connections, scenes, addresses_taking_scenes(cluster, /*excluded=*/""), progress));
+  const RebalancePlan plan = plan_rebalance(read_loads(
+      connections, scenes, addresses_taking_scenes(cluster, /*excluded=*/""), MemoryScenes::kStay, progress));
   progress.hide();
   ReportStream stream(context.out(), context.format(),
                       {.rows_name = "moves",
@@ -243,15 +251,21 @@ void add_cluster_status(CLI::App& parent, Context& context) {
   run_when_chosen(command, options, context, show_status);
 }
 
+void add_with_memory(CLI::App& command, bool& with_memory) {
+  command.add_flag("--with-memory", with_memory, "Move scenes of durability memory, too, which lose their objects");
+}
+
 void add_cluster_move(CLI::App& parent, Context& context) {
   const auto options = std::make_shared<ClusterMoveOptions>();
   CLI::App& command = *parent.add_subcommand("move", "Move the leadership of a scene to another member");
   command.footer(
       "Updates wait for about a second at most; nothing is lost, and epoch and revisions go on. Any member may be\n"
-      "asked: the command finds the leader. It needs the right `admin` to the scene.\n"
+      "asked: the command finds the leader. It needs the right `admin` to the scene. A scene of durability memory is\n"
+      "not moved without --with-memory, because it begins anew, empty and in another epoch.\n"
       "Examples:\n  locus cluster move arena\n  locus cluster move arena 10.0.0.7:7575");
   add_scene_argument(command, options->scene);
   command.add_option("ADDRESS", options->address, "The new leader, as `cluster status` shows it [the less loaded]");
+  add_with_memory(command, options->with_memory);
   run_when_chosen(command, options, context, move_leadership);
 }
 
@@ -264,6 +278,7 @@ void add_cluster_drain(CLI::App& parent, Context& context) {
       "remain, if there are any.\n"
       "Examples:\n  locus cluster drain 10.0.0.7:7575\n  locus -o json cluster drain 10.0.0.7:7575");
   command.add_option("ADDRESS", options->address, "The member, as `cluster status` shows it")->required();
+  add_with_memory(command, options->with_memory);
   run_when_chosen(command, options, context, drain_member);
 }
 
@@ -273,8 +288,9 @@ void add_cluster_rebalance(CLI::App& parent, Context& context) {
   command.footer(
       "Scenes move until the busiest member has at most 1.2 times the mean load, or no move helps. The load of a "
       "scene\n"
-      "is 1,000 and 1 for each object. Each move is printed when it is made. Refused while a member drains, because\n"
-      "its scenes are moving then.\n"
+      "is 1,000 and 1 for each object. Each move is printed when it is made. Scenes of durability memory stay. "
+      "Refused\n"
+      "while a member drains, because its scenes are moving then.\n"
       "Examples:\n  locus cluster rebalance --dry-run\n  locus cluster rebalance");
   command.add_flag("--dry-run", options->dry_run, "Print the moves and make none");
   run_when_chosen(command, options, context, rebalance_scenes);
@@ -285,8 +301,9 @@ void add_cluster_map(CLI::App& parent, Context& context) {
   CLI::App& command = *parent.add_subcommand("map", "Print the leader of each scene, as a map for HAProxy");
   command.footer(
       "A line `SCENE ADDRESS` for each scene that has a leader, ascending by scene. HAProxy looks up the metadata\n"
-      "`x-scene` in it: see deploy/cluster/haproxy.cfg. FILE is replaced in one step, and only if the scenes could be\n"
-      "listed, so that a proxy never reads a part.\n"
+      "`x-scene` in it (deploy/cluster/haproxy.cfg), and reads the file when it starts or reloads; update_map.py "
+      "there\n"
+      "changes the map of a running proxy. FILE is replaced in one step, and only if the scenes could be listed.\n"
       "Examples:\n  locus cluster map\n  locus cluster map /etc/locus/scenes.map");
   command.add_option("FILE", options->file, "Replace this file instead of printing the map");
   run_when_chosen(command, options, context, show_map);

@@ -16,6 +16,7 @@
 #include "tests/support/cluster_servers.h"
 #include "tests/support/http_get.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/text_of.h"
 
 namespace locus::test {
 namespace {
@@ -144,6 +145,27 @@ TEST_F(ClusterCommandTest, ADrainedMemberLeadsNothingAndTheOthersLeadAllAlike) {
   EXPECT_EQ(again.out, absl::StrCat("moved 0 scenes from ", address(1), ", which leads none now\n"));
 }
 
+TEST_F(ClusterCommandTest, ScenesInMemoryStayUntilTheLineSaysThatTheirObjectsMayBeLost) {
+  v1::CreateSceneRequest request;
+  request.set_name("dust");
+  request.mutable_spec()->set_durability(v1::DURABILITY_MEMORY);
+  grpc::ClientContext creating;
+  set_timeout(creating);
+  v1::CreateSceneResponse created;
+  ASSERT_TRUE(servers_[0]->stubs().scenes->CreateScene(&creating, request, &created).ok());
+  const size_t leader = leader_of("dust");
+  const Outcome refused = run_at((leader + 1) % 3, {"cluster", "move", "dust"});
+  EXPECT_EQ(refused.code, ExitCode::kFailed);
+  EXPECT_THAT(refused.err, HasSubstr("--with-memory"));
+  const Outcome drained = run_at(0, {"cluster", "drain", address(leader)});
+  EXPECT_EQ(drained.code, ExitCode::kFailed);
+  EXPECT_THAT(drained.out, HasSubstr("--with-memory"));
+  EXPECT_EQ(leader_of("dust"), leader);
+  EXPECT_EQ(json_at(0, {"cluster", "drain", address(leader), "--with-memory"})["moved"], 1);
+  EXPECT_NE(leader_of("dust"), leader);
+  EXPECT_EQ(run_at(leader, {"cluster", "move", "dust", address(leader), "--with-memory"}).code, ExitCode::kOk);
+}
+
 TEST_F(ClusterCommandTest, RebalancingMovesWhatItPlanned) {
   constexpr int kScenes = 9;
   create(kScenes);
@@ -168,8 +190,8 @@ TEST_F(ClusterCommandTest, TheMapIsTheSameAtEveryServerAndReplacesAFileInOneStep
   create(4);
   const std::string lines = run_at(0, {"cluster", "map"}).out;
   std::vector<std::string> scenes;
-  for (const std::string& line : absl::StrSplit(lines, '\n', absl::SkipEmpty()))
-    scenes.push_back(line.substr(0, line.find(' ')));
+  for (const absl::string_view line : absl::StrSplit(lines, '\n', absl::SkipEmpty()))
+    scenes.emplace_back(line.substr(0, line.find(' ')));
   EXPECT_EQ(scenes, (std::vector<std::string>{"scene0", "scene1", "scene2", "scene3"}));
   for (size_t at = 1; at < 3; ++at)
     EXPECT_TRUE(becomes_true([&] { return run_at(at, {"cluster", "map"}).out == lines; })) << at;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
 #include "client/lib/status.h"
 #include "core/base/status_macros.h"
@@ -17,11 +18,23 @@ v1::Reason reason_of(const absl::Status& status) {
   return error ? error->reason() : v1::REASON_UNSPECIFIED;
 }
 
+// Refuses to move a scene that its new leader would not have.
+absl::Status check_not_in_memory(const client::Client& client, const std::string& name) {
+  ASSIGN_OR_RETURN(const v1::Scene scene, client.get_scene(name));
+  if (scene.spec().durability() != v1::DURABILITY_MEMORY) return absl::OkStatus();
+  return absl::FailedPreconditionError(absl::StrCat(
+      name, " is in the memory of its leader only: --with-memory moves it without its objects and instances"));
+}
+
 // Calls a server, again while the scene has no leader or its leader still reads it. `calls` counts all calls.
 absl::StatusOr<v1::MoveSceneResponse> call_with_leader(const client::Client& client,
-                                                       const v1::MoveSceneRequest& request, int& calls) {
+                                                       const v1::MoveSceneRequest& request, MemoryScenes memory,
+                                                       int& calls) {
   while (true) {
-    absl::StatusOr<v1::MoveSceneResponse> moved = client.move_scene(request);
+    const absl::Status checked =
+        memory == MemoryScenes::kMove ? absl::OkStatus() : check_not_in_memory(client, request.scene());
+    absl::StatusOr<v1::MoveSceneResponse> moved = checked;
+    if (checked.ok()) moved = client.move_scene(request);
     if (++calls >= ClusterConnections::kMaxCalls || reason_of(moved.status()) != v1::REASON_NO_LEADER) return moved;
     absl::SleepFor(std::max(kMinWait, client::retry_after(moved.status())));
   }
@@ -43,11 +56,12 @@ absl::StatusOr<client::Client*> ClusterConnections::at(const std::string& addres
   return found->second->get();
 }
 
-absl::StatusOr<v1::MoveSceneResponse> ClusterConnections::move(const std::string& scene, const std::string& to) {
+absl::StatusOr<v1::MoveSceneResponse> ClusterConnections::move(const std::string& scene, const std::string& to,
+                                                               MemoryScenes memory) {
   ASSIGN_OR_RETURN(client::Client * client, context_.connect());
   int calls = 0;
   while (true) {
-    absl::StatusOr<v1::MoveSceneResponse> moved = call_with_leader(*client, request_of(scene, to), calls);
+    absl::StatusOr<v1::MoveSceneResponse> moved = call_with_leader(*client, request_of(scene, to), memory, calls);
     if (calls >= kMaxCalls || reason_of(moved.status()) != v1::REASON_ELSEWHERE) return moved;
     const std::optional<v1::Error> error = client::error_of(moved.status());
     if (error->addresses().empty()) return moved;
@@ -59,7 +73,7 @@ absl::StatusOr<v1::MoveSceneResponse> ClusterConnections::move_from(const std::s
                                                                     const std::string& to) {
   ASSIGN_OR_RETURN(client::Client* const client, at(from));
   int calls = 0;
-  return call_with_leader(*client, request_of(scene, to), calls);
+  return call_with_leader(*client, request_of(scene, to), MemoryScenes::kMove, calls);
 }
 
 }  // namespace locus::cli

@@ -34,7 +34,8 @@ absl::StatusOr<std::vector<LedScene>> read_led_scenes(const client::Client& clie
   led.reserve(scenes.size());
   for (const v1::Scene& scene : scenes) {
     const bool has_leader = scene.placement().role() != v1::SCENE_ROLE_NO_LEADER;
-    led.push_back({scene.name(), has_leader ? scene.placement().leader() : ""});
+    led.push_back({scene.name(), has_leader ? scene.placement().leader() : "",
+                   scene.spec().durability() == v1::DURABILITY_MEMORY});
   }
   std::sort(led.begin(), led.end(), [](const LedScene& a, const LedScene& b) { return a.name < b.name; });
   return led;

@@ -18,8 +18,12 @@ namespace locus::cli {
 // One scene of a cluster.
 struct LedScene {
   std::string name;
-  std::string leader;  // address; empty: no member leads the scene at present
+  std::string leader;      // address; empty: no member leads the scene at present
+  bool in_memory = false;  // durability memory: a new leader begins with an empty scene
 };
+
+// Whether to move scenes of durability memory, which lose their objects then.
+enum class MemoryScenes { kStay, kMove };
 
 // Returns the description of the server's cluster. Returns FAILED_PRECONDITION if the server belongs to no cluster.
 absl::StatusOr<v1::Cluster> read_cluster(const client::Client& client);

@@ -8,7 +8,8 @@
 namespace locus::cli {
 
 std::vector<MemberLoad> read_loads(ClusterConnections& connections, const std::vector<LedScene>& scenes,
-                                   const std::vector<std::string>& addresses, ProgressWriter& progress) {
+                                   const std::vector<std::string>& addresses, MemoryScenes memory,
+                                   ProgressWriter& progress) {
   std::vector<MemberLoad> loads;
   std::map<std::string, size_t> index;
   for (const std::string& address : addresses) {
@@ -25,10 +26,11 @@ std::vector<MemberLoad> read_loads(ClusterConnections& connections, const std::v
     const absl::StatusOr<client::Client*> client = connections.at(scene.leader);
     const absl::StatusOr<v1::Scene> described =
         client.ok() ? (*client)->get_scene(scene.name) : absl::StatusOr<v1::Scene>(client.status());
-    if (described.ok())
-      member.scenes.push_back({scene.name, kSceneLoad + described->objects()});
+    const uint64_t load = kSceneLoad + (described.ok() ? described->objects() : 0);
+    if (described.ok() && (!scene.in_memory || memory == MemoryScenes::kMove))
+      member.scenes.push_back({scene.name, load});
     else
-      member.fixed += kSceneLoad;
+      member.fixed += load;
   }
   return loads;
 }

@@ -16,9 +16,11 @@
 namespace locus::cli {
 
 // Reads the scenes of the members at `addresses` from these members, in the order of `addresses`. A scene that its
-// leader does not describe, because it is being moved or read, counts as a small scene that stays.
+// leader does not describe, because it is being moved or read, counts as a small scene that stays. Scenes of durability
+// memory stay if `memory` is kStay.
 std::vector<MemberLoad> read_loads(ClusterConnections& connections, const std::vector<LedScene>& scenes,
-                                   const std::vector<std::string>& addresses, ProgressWriter& progress);
+                                   const std::vector<std::string>& addresses, MemoryScenes memory,
+                                   ProgressWriter& progress);
 
 // Makes the moves one after another, and passes the outcome of each to `on_moved`.
 void make_moves(ClusterConnections& connections, const std::vector<PlannedMove>& moves, ProgressWriter& progress,
