@@ -291,9 +291,9 @@ absl::StatusOr<MeshPtr> Registry::add_mesh(const std::string& name, MeshPtr mesh
     if (content) log_->store_topology(mesh->sha256(), encode_topology(mesh->tree().topology()));
   }
   const MutexLock lock(mutex_);
-  const auto [known, added] = meshes_.emplace(name, mesh);  // in a cluster, a reader may have added it meanwhile
+  const auto [kept, added] = meshes_.emplace(name, mesh);  // in a cluster, a reader may have added it meanwhile
   if (added) add_to_creator(*mesh);
-  return known->second;
+  return kept->second;
 }
 
 uint32_t Registry::count_uses(const StaticMesh* mesh) const {

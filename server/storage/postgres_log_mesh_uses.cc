@@ -52,6 +52,7 @@ absl::Status PostgresLog::insert_uses(EngineConnection& connection, SceneKey sce
     names.push_back(use.name);
     numbers.push_back(use.instances);
   }
+  RETURN_IF_ERROR(connection.run(answer_deadline()));  // what was added before, whose results come first
   RETURN_IF_ERROR(lock_meshes(connection, names, uses, answer_deadline()));
   connection.add(
       "INSERT INTO locus.scene_mesh (scene, name, instances)"

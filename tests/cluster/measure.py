@@ -93,8 +93,8 @@ def measure(rounds, name, bar, daemons, interrupt):
         errors += found
         daemons.repair()
         time.sleep(3)
-    print(f"{name}: writes stopped for {statistics.median(gaps):.2f} s (of {rounds}: {min(gaps):.2f}-{max(gaps):.2f}); bar {bar}; "
-          f"errors: {errors or 'none'}", flush=True)
+    print(f"{name}: writes stopped for {statistics.median(gaps):.2f} s (of {rounds}: {min(gaps):.2f}-{max(gaps):.2f}); "
+          f"bar {bar}; errors: {errors or 'none'}", flush=True)
 
 
 def all_scenes(daemons, at):

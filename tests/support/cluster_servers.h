@@ -58,6 +58,7 @@ bool becomes_true(const Once& once) {
 template <class Call>
 grpc::Status call_in_cluster(const std::vector<ClusterServer*>& servers, size_t& at, const Call& call) {
   grpc::Status status;
+  uint64_t newest = 0;  // token of the last server that was named
   for (int i = 0; i < 2000; ++i) {
     grpc::ClientContext context;
     set_timeout(context);
@@ -69,6 +70,11 @@ grpc::Status call_in_cluster(const std::vector<ClusterServer*>& servers, size_t&
     if (status.ok()) return status;
     const v1::Error error = error_of(status);
     if (error.reason() != v1::REASON_ELSEWHERE) return status;
+    if (error.token() < newest) {  // this server does not know yet that it leads the scene, as another one has said
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+      continue;
+    }
+    newest = error.token();
     for (size_t next = 0; next < servers.size(); ++next)
       if (servers[next]->address() == error.addresses(0)) at = next;
   }

@@ -339,7 +339,7 @@ class SimulatedCluster {
   std::vector<std::pair<Time, Time>> outages_;
   Time engine_free_at_ = Time::min();
   std::map<server::MemberId, Time> last_beats_;  // that the engine has executed
-  // What a daemon was told, by its number; it stays when the daemon is killed, because statements may be late.
+  // Orders that a daemon was given, by its number; they stay when the daemon is killed, because statements may be late.
   struct Permission {
     bool drains = false;
     std::multiset<std::pair<SceneKey, server::MemberId>> moves;  // to this member

@@ -157,10 +157,16 @@ absl::StatusOr<ClusterScenes::Created> ClusterScenes::create(const std::string& 
 
 absl::StatusOr<ScenePtr> ClusterScenes::wait_for(const std::string& name, steady_clock::time_point deadline) {
   const steady_clock::time_point until = std::min(deadline, steady_clock::now() + kWait);
+  bool asked = false;
   while (true) {
     absl::StatusOr<ScenePtr> scene = host_.registry.find_scene(name);
     if (!absl::IsNotFound(scene.status())) return scene;
-    const absl::Status why = missing(name);
+    absl::Status why = missing(name);
+    if (absl::IsNotFound(why) && !std::exchange(asked, true)) {
+      // Another member may have acknowledged the creation after this one had asked.
+      RETURN_IF_ERROR(directory_.look_up(name).status());
+      continue;
+    }
     if (!absl::IsUnavailable(why) || steady_clock::now() >= until) return why;
     std::this_thread::sleep_for(kPoll);
   }

@@ -64,7 +64,7 @@ void SceneDirectory::store(const std::string& name, const std::optional<Catalogu
   if (entries_.size() >= kMaxEntries && !entries_.contains(name)) entries_.clear();
   Entry& entry = entries_[name];
   if (asked < entry.forgotten) return;
-  entry.read = asked;
+  entry.read = steady_clock::now();
   // An older answer can arrive later; the tokens of one scene only increase.
   const bool older = scene && entry.scene && scene->key == entry.scene->key && scene->token < entry.scene->token;
   if (!older) entry.scene = scene;
@@ -78,7 +78,7 @@ std::vector<MemberRow> SceneDirectory::members() {
 
 std::vector<MemberRow> SceneDirectory::known_members() {
   const MutexLock lock(mutex_);
-  if (!members_read_ || steady_clock::now() - *members_read_ > kFresh) {
+  if (!members_read_ || steady_clock::now() - *members_read_ > kFreshMembers) {
     members_asked_ = true;
     asked_soon_.notify_all();
   }
@@ -95,7 +95,7 @@ std::string SceneDirectory::address_of(MemberId member) const {
 void SceneDirectory::refresh_members(MemberId wanted) {
   {
     const MutexLock lock(mutex_);
-    const bool fresh = members_read_ && steady_clock::now() - *members_read_ <= kFresh;
+    const bool fresh = members_read_ && steady_clock::now() - *members_read_ <= kFreshMembers;
     const bool has_wanted = wanted == 0 || std::any_of(members_.begin(), members_.end(),
                                                        [wanted](const MemberRow& row) { return row.id == wanted; });
     if (fresh && has_wanted) return;

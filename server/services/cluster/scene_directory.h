@@ -27,8 +27,11 @@ namespace locus::server {
 
 class SceneDirectory {
  public:
-  // Age up to which an entry says that a scene does not exist or has no leader, and the list of members is used again.
-  static constexpr std::chrono::milliseconds kFresh{500};
+  // Age up to which an entry is used without reading it again, and up to which one says that a scene does not exist or
+  // has no leader.
+  static constexpr std::chrono::milliseconds kFresh{50};
+  // Age up to which the list of members is used without reading it again.
+  static constexpr std::chrono::milliseconds kFreshMembers{500};
   static constexpr size_t kMaxEntries = 65'536;
   static constexpr size_t kMaxAsked = 4'096;
 
@@ -49,10 +52,10 @@ class SceneDirectory {
   // Makes the next known() look the scene up.
   void forget(const std::string& name) LOCUS_EXCLUDES(mutex_);
 
-  // Returns the living members, at most kFresh old; older ones if the engine does not answer.
+  // Returns the living members, at most kFreshMembers old; older ones if the engine does not answer.
   std::vector<MemberRow> members() LOCUS_EXCLUDES(mutex_);
   // Returns the living members as last read, without waiting, and begins to read them again if they are older than
-  // kFresh.
+  // kFreshMembers.
   std::vector<MemberRow> known_members() LOCUS_EXCLUDES(mutex_);
   // Returns the address of a living member as last read, without waiting; empty if it is not known.
   std::string address_of(MemberId member) const LOCUS_EXCLUDES(mutex_);
@@ -61,12 +64,12 @@ class SceneDirectory {
   using Time = std::chrono::steady_clock::time_point;
   struct Entry {
     std::optional<CatalogueScene> scene;
-    Time read;       // min(): not read since forget()
+    Time read;       // when the answer came; min(): not read since forget()
     Time forgotten;  // answers of questions that were asked before are too old
   };
 
   void run() LOCUS_EXCLUDES(mutex_);
-  // Reads the members if the list is older than kFresh or lacks `wanted`.
+  // Reads the members if the list is older than kFreshMembers or lacks `wanted`.
   void refresh_members(MemberId wanted) LOCUS_EXCLUDES(mutex_);
   void ask(const std::string& name) LOCUS_REQUIRES(mutex_);
 
