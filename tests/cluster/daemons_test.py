@@ -43,6 +43,14 @@ SCENES = ["arena", "maze"]
 # Columns of the tables that are damaged, without their last one: bytes.
 COLUMNS = {"record": ("scene", "sequence", "epoch", "writer", "batch", "chain"),
            "snapshot_chunk": ("scene", "snapshot", "number", "checksum"), "mesh_chunk": ("content", "number", "checksum")}
+LOST_RECORDS = 20
+# Deletes the last records of each scene, and makes the log end before them as if they had never been written.
+LOSE_RECORDS = """
+WITH cut AS (UPDATE locus.scene_log log SET last = record.sequence, chain = record.chain FROM locus.record
+             WHERE record.scene = log.scene AND record.sequence = log.last - %s RETURNING log.scene, log.last),
+     lost AS (DELETE FROM locus.record USING cut WHERE record.scene = cut.scene AND record.sequence > cut.last RETURNING 1)
+SELECT count(*) FROM lost
+"""
 
 
 def say(text):
@@ -260,6 +268,21 @@ class ClusterTest(unittest.TestCase):
                 recorder.history.write(file)
         violations = check(recorder.history)
         self.assertFalse(violations, report(recorder.history, violations, origin=str(plan)))
+
+    def test_acknowledged_records_that_the_engine_loses_are_found(self):
+        recorder = Recorder(SEED)
+        with Engine(life_seconds=LIFE_SECONDS) as engine, Daemons(2, engine) as daemons:
+            with Workload(daemons, dict.fromkeys(SCENES, {}), recorder, clustered=True) as workload:
+                workload.wait_for("acks", ACKS)
+                for daemon in daemons.daemons:
+                    daemons.kill(daemon)
+                lost = engine.ask(engine.primary, LOSE_RECORDS, LOST_RECORDS)
+                self.assertEqual(lost, [(len(SCENES) * LOST_RECORDS,)])
+                for daemon in daemons.daemons:
+                    daemons.start(daemon)
+                workload.wait_for("acks", 50)  # few, since reads wait for revisions that are lost
+                workload.finish()
+        self.assertLessEqual({"unique", "model"}, rules(recorder.history))
 
 
 def longest_pauses(history, scenes):
