@@ -94,6 +94,7 @@ class OneDaemonTest(unittest.TestCase):
         violations = check(history)
         self.assertFalse(violations, report(history, violations))
         self.assertTrue([call for call in history.calls if call.kind == UPDATE and call.outcome == UNKNOWN], "all was answered")
+        self.assertTrue([call for call in history.calls if call.duplicate], "no batch was repeated")
         self.assertTrue([call for call in history.calls if call.refused], "no item was refused")
 
     def test_acknowledged_updates_that_a_disk_loses_are_found(self):

@@ -22,6 +22,9 @@ SETUP_SECONDS = 60
 READ_SECONDS = 2
 PAUSE_SECONDS = 0.002     # between the calls of a client
 RETRY_SECONDS = (0.02, 1)  # least and greatest pause after a failure
+AGAIN = 0.03              # share of the acknowledged batches that are sent once more, as if the ack had been lost
+HASTY = 0.04              # share of the updates whose deadline is so short that their outcome is often unknown
+HASTY_SECONDS = 0.003
 RECENT = 10               # revisions before the newest one that a client asks for by `exactly`
 SERIALS = 1_000_000       # updates of a client; times the clients they are exact as floats
 MEMORY = {"durability": 1}  # SceneSpec of a scene without a log
@@ -216,6 +219,8 @@ class Client(threading.Thread):
             if answer.answered:
                 self.writers[scene] = (writer, last + 1)
                 self.counts["repeats"] += attempts > 1
+                if self.random.random() < AGAIN:
+                    self.update_once(scene, batch)
                 return
             if answer.reason == "REASON_BATCH_GAP":  # a scene without a log forgot the writer
                 self.counts["gaps"] += 1
@@ -253,7 +258,8 @@ class Client(threading.Thread):
         """Sends an update once, and records the attempt."""
         name = self.target(scene)
         call = self.recorder.invoke(UPDATE, scene, self.session, **asked)
-        answer = self.caller.send(name, service, rpc, request)
+        hasty = self.random.random() < HASTY
+        answer = self.caller.send(name, service, rpc, request, HASTY_SECONDS if hasty else calls.CALL_SECONDS)
         if answer.answered:
             self.leaders[scene] = name
             self.counts["acks"] += 1
