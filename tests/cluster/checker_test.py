@@ -190,6 +190,9 @@ CORRECT = [
     ("a deposed leader tells of a batch that had been applied before", [
         led(0, 1, 1, {1: A}, 1, "d0", writer=4, batch=1), token(2, 3, 2),
         led(4, 5, 1, {1: A}, 1, "d0", writer=4, batch=1, duplicate=True)]),
+    ("a deposed leader answers batches that change nothing", [
+        led(0, 1, 1, {1: A}, 1, "d0"), token(2, 3, 2), led(4, 5, 1, {}, 1, "d0"),
+        led(4, 5, 1, {2: B}, 1, "d0", conditional=True, applied=0, refused=1)]),
     ("an update was acknowledged while a takeover was seen", [token(0, 2, 2), led(1, 3, 1, {1: A}, 1, "d0")]),
     ("an old answer says so", [
         update(0, 1, 1, {1: A}), update(2, 3, 2, {1: B}), read(3 + 3 * MS, 4 + 3 * MS, 1, {1: A}, age_ms=4)]),
@@ -244,6 +247,8 @@ class AcceptTest(unittest.TestCase):
     def test_a_partition_lets_two_daemons_lead_a_scene_without_a_log_but_no_other_scene(self):
         self.assertEqual(rules(History(PARTITION, memory_scenes={"s"}, partitions=[(4, 6)])), set())
         self.assertEqual(rules(History(PARTITION, memory_scenes={"s"}, partitions=[(6, 9)])), {"epoch", "token"})
+        same_client = [*PARTITION[:2], led(4, 5, 2, {1: C}, 1, "d0")]
+        self.assertEqual(rules(History(same_client, memory_scenes={"s"}, partitions=[(4, 6)])), set())
         self.assertEqual(rules(History(PARTITION, partitions=[(0, 9)])), {"epoch", "token"})
 
     def test_partitions_are_written_and_read_again(self):
