@@ -5,11 +5,14 @@
 #include <optional>
 #include <utility>
 
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_split.h"
 #include "absl/time/clock.h"
 #include "client/lib/authorization.h"
 #include "client/lib/connection.h"
-#include "client/lib/retry.h"
+#include "client/lib/open_cluster.h"
+#include "client/lib/router.h"
 #include "client/lib/status.h"
 #include "client/lib/transfers.h"
 #include "client/lib/writer.h"
@@ -25,52 +28,32 @@
 namespace locus::client {
 namespace {
 
-enum class Repeat { kNever, kWhenUnavailable };
-
-// Parameters of a call in addition to its request: link, token, timeout, retries, and the name of its scene (empty
-// if the call concerns no scene).
-struct CallPlan {
-  const Link& link;
-  Authorization& authorization;
-  RunningCalls& running;
-  absl::Duration deadline;
-  RetryPolicy retry;
-  Repeat repeat = Repeat::kNever;
-  absl::string_view scene = {};
-  // True if the call is an update with a writer and a batch number: see outcome_unknown().
-  bool numbered_update = false;
-};
-
-template <class Stub, class Request, class Response>
-absl::StatusOr<Response> call(Stub& stub, const CallPlan& plan, const Request& request,
-                              grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*)) {
-  const absl::Time deadline = absl::Now() + plan.deadline;
+// Runs a unary call: `invoke` makes it at a server.
+template <class Response, class Invoke>
+absl::StatusOr<Response> call_with(Router& router, const CallPlan& plan, const Invoke& invoke,
+                                   Reading* reading = nullptr) {
   Response response;
-  uint64_t token = 0;
-  bool lost = false;  // whether the outcome of an attempt is unknown
-  const auto once = [&]() -> absl::Status {
-    ASSIGN_OR_RETURN(const CallGate::Permit permit, CallGate::enter(plan.link.gate));
-    continue_connecting(plan.link, deadline);
-    CancellableContext context(&plan.running);
-    token = prepare(context, {plan.authorization, deadline, plan.scene});
+  const auto attempt = [&](const ServerLinks& server, absl::Time deadline, uint64_t& token) -> absl::Status {
+    ASSIGN_OR_RETURN(const CallGate::Permit permit, CallGate::enter(server.latency.gate));
+    continue_connecting(server.latency, deadline);
+    CancellableContext context(&router.running());
+    token = prepare(context, {*server.authorization, deadline, plan.scene});
     response.Clear();
-    return to_absl_status((stub.*method)(&context, request, &response));
+    return to_absl_status(invoke(server, context, response));
   };
-  const auto attempt = [&]() -> absl::Status {
-    absl::Status status = once();
-    lost = lost || (!status.ok() && !changed_nothing(status) && !absl::IsUnauthenticated(status));
-    return status;
-  };
-  const auto wait = [&](absl::Duration duration) { wait_connecting(plan.link, duration); };
-  const auto attempts = [&] {
-    return plan.repeat == Repeat::kNever ? attempt() : with_retries(plan.retry, deadline, attempt, wait);
-  };
-  absl::Status status = attempts();
-  // Repeat even a call that is not safe to repeat: a server that refuses the token has changed nothing.
-  if (absl::IsUnauthenticated(status) && plan.authorization.has_newer(token)) status = attempts();
-  if (lost && plan.numbered_update && changed_nothing(status)) return outcome_unknown(status);
-  RETURN_IF_ERROR(status);
+  RETURN_IF_ERROR(router.run(plan, attempt, reading));
   return response;
+}
+
+// Calls a method of one of the stubs of a server.
+template <class Stub, class Request, class Response>
+absl::StatusOr<Response> call(Router& router, const CallPlan& plan, std::unique_ptr<Stub> ServerLinks::*stub,
+                              const Request& request,
+                              grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*)) {
+  return call_with<Response>(router, plan,
+                             [&](const ServerLinks& server, grpc::ClientContext& context, Response& response) {
+                               return (*(server.*stub).*method)(&context, request, &response);
+                             });
 }
 
 // Unary method that is known by its path only.
@@ -111,37 +94,18 @@ absl::Status outcome_of_query(const absl::Status& status, absl::string_view scen
 }  // namespace
 
 struct Client::Connection {
-  std::string address;
   ClientOptions options;
-  std::shared_ptr<Authorization> authorization;
-  Link latency;  // for Lane::kLatency and unary calls
-  Link bulk;
-  std::unique_ptr<v1::ServerService::StubInterface> servers;
-  std::unique_ptr<v1::SceneService::StubInterface> scenes;
-  std::unique_ptr<v1::UpdateService::StubInterface> updates;
-  std::unique_ptr<v1::QueryService::StubInterface> queries;
-  std::unique_ptr<v1::SceneService::StubInterface> transfers;  // stub on `bulk`, for uploads, downloads and dumps
-  std::unique_ptr<RunningCalls> running = std::make_unique<RunningCalls>();
+  std::shared_ptr<Router> router;  // streams share it
+  std::string address = router->address();
 
-  Connection(std::string with_address, const ClientOptions& with, std::shared_ptr<Authorization> with_authorization,
-             Link with_latency, Link with_bulk)
-      : address(std::move(with_address)),
-        options(with),
-        authorization(std::move(with_authorization)),
-        latency(std::move(with_latency)),
-        bulk(std::move(with_bulk)),
-        servers(v1::ServerService::NewStub(latency.channel)),
-        scenes(v1::SceneService::NewStub(latency.channel)),
-        updates(v1::UpdateService::NewStub(latency.channel)),
-        queries(v1::QueryService::NewStub(latency.channel)),
-        transfers(v1::SceneService::NewStub(bulk.channel)) {}
-
-  const Link& link_of(Lane lane) const { return lane == Lane::kBulk ? bulk : latency; }
   CallPlan once(absl::string_view scene = {}) const {
-    return {latency, *authorization, *running, options.deadline, options.retry, Repeat::kNever, scene};
+    const bool cluster = router->routes() != nullptr;
+    return {cluster ? options.cluster.deadline : options.deadline, options.retry, Repeat::kNever, scene};
   }
   CallPlan repeatable(absl::string_view scene = {}) const {
-    return {latency, *authorization, *running, options.deadline, options.retry, Repeat::kWhenUnavailable, scene};
+    CallPlan plan = once(scene);
+    plan.repeat = Repeat::kWhenUnavailable;
+    return plan;
   }
   // Returns the plan of a call that applies `batch`, which is repeatable if the batch has a writer and a number.
   CallPlan update(absl::string_view scene, const v1::UpdateBatch& batch) const {
@@ -150,11 +114,22 @@ struct Client::Connection {
     plan.numbered_update = true;
     return plan;
   }
-  // Prepares a call on `bulk`, whose deadline is `timeout` from now, and returns its header.
-  CallHeader bulk_header(absl::Duration timeout, absl::string_view scene = {}) const {
-    const absl::Time deadline = absl::Now() + timeout;
-    continue_connecting(bulk, deadline);
-    return {*authorization, deadline, scene, running.get()};
+  // Returns the plan of a transfer, whose deadline is `timeout` from its start.
+  CallPlan transfer(absl::Duration timeout, absl::string_view scene = {}) const {
+    return {timeout, options.retry, Repeat::kNever, scene, false, {}, Lane::kBulk};
+  }
+  // Runs a transfer: `invoke` makes it at a server.
+  absl::Status run_transfer(const CallPlan& plan,
+                            const std::function<absl::Status(const ServerLinks&, const CallHeader&)>& invoke) const {
+    return router->run(plan, [&](const ServerLinks& server, absl::Time deadline, uint64_t&) -> absl::Status {
+      continue_connecting(server.bulk, deadline);
+      ASSIGN_OR_RETURN(const CallGate::Permit permit, CallGate::enter(server.bulk.gate));
+      return invoke(server, {*server.authorization, deadline, plan.scene, &router->running()});
+    });
+  }
+  // Notes the revision of an ack.
+  void saw(absl::string_view scene, const v1::UpdateAck& ack) const {
+    if (router->routes() != nullptr) router->routes()->saw(scene, {ack.epoch(), ack.revision()}, true);
   }
 };
 
@@ -162,35 +137,46 @@ Client::Client(std::unique_ptr<Connection> connection) : connection_(std::move(c
 Client::~Client() = default;
 
 absl::StatusOr<std::unique_ptr<Client>> Client::connect(absl::string_view address, const ClientOptions& options) {
+  if (absl::StrContains(address, ',') && !absl::StartsWith(address, "unix:"))
+    return connect_cluster(absl::StrSplit(address, ','), options);
   ASSIGN_OR_RETURN(const std::string target, target_of(address));
   ASSIGN_OR_RETURN(std::shared_ptr<Authorization> authorization, Authorization::make(options.credentials, target));
   ASSIGN_OR_RETURN(const auto credentials, channel_credentials(options.credentials));
   std::shared_ptr<grpc::Channel> channel = open_channel(target, options, credentials);
   RETURN_IF_ERROR(await_connection(channel, target, options));
   std::shared_ptr<grpc::Channel> bulk = open_channel(target, options, credentials);
+  auto server = std::make_shared<ServerLinks>(target, std::move(authorization), Link{channel}, Link{bulk});
   return std::unique_ptr<Client>(
-      new Client(std::make_unique<Connection>(target, options, std::move(authorization), Link{channel}, Link{bulk})));
+      new Client(std::make_unique<Connection>(Connection{options, std::make_shared<Router>(std::move(server))})));
+}
+
+absl::StatusOr<std::unique_ptr<Client>> Client::connect_cluster(const std::vector<std::string>& addresses,
+                                                                const ClientOptions& options) {
+  ASSIGN_OR_RETURN(std::shared_ptr<Router> router, open_cluster(addresses, options));
+  return std::unique_ptr<Client>(new Client(std::make_unique<Connection>(Connection{options, std::move(router)})));
 }
 
 std::unique_ptr<Client> Client::in_process(const std::shared_ptr<grpc::Channel>& channel,
                                            std::shared_ptr<CallGate> gate, const ClientOptions& options) {
   const Link link{channel, std::move(gate)};
+  auto server = std::make_shared<ServerLinks>("in-process", Authorization::none(), link, link);
   return std::unique_ptr<Client>(
-      new Client(std::make_unique<Connection>("in-process", options, Authorization::none(), link, link)));
+      new Client(std::make_unique<Connection>(Connection{options, std::make_shared<Router>(std::move(server))})));
 }
 
 const std::string& Client::address() const { return connection_->address; }
 
 absl::StatusOr<v1::GetServerResponse> Client::get_server() const {
-  return call(*connection_->servers, connection_->repeatable(), v1::GetServerRequest(),
+  return call(*connection_->router, connection_->repeatable(), &ServerLinks::servers, v1::GetServerRequest(),
               &v1::ServerService::StubInterface::GetServer);
 }
 
 absl::StatusOr<std::vector<v1::IdentityQuotas>> Client::get_quotas(v1::GetQuotasRequest request) const {
   std::vector<v1::IdentityQuotas> quotas;
   do {
-    ASSIGN_OR_RETURN(v1::GetQuotasResponse page, call(*connection_->servers, connection_->repeatable(), request,
-                                                      &v1::ServerService::StubInterface::GetQuotas));
+    ASSIGN_OR_RETURN(v1::GetQuotasResponse page,
+                     call(*connection_->router, connection_->repeatable(), &ServerLinks::servers, request,
+                          &v1::ServerService::StubInterface::GetQuotas));
     for (v1::IdentityQuotas& entry : *page.mutable_identities()) quotas.push_back(std::move(entry));
     request.set_page_token(page.next_page_token());
   } while (!request.page_token().empty());
@@ -199,20 +185,26 @@ absl::StatusOr<std::vector<v1::IdentityQuotas>> Client::get_quotas(v1::GetQuotas
 
 absl::StatusOr<Health> Client::health(absl::string_view service) const {
   namespace health = grpc::health::v1;
-  const std::unique_ptr<health::Health::StubInterface> stub = health::Health::NewStub(connection_->latency.channel);
   health::HealthCheckRequest request;
   request.set_service(std::string(service));
   ASSIGN_OR_RETURN(const health::HealthCheckResponse response,
-                   call(*stub, connection_->repeatable(), request, &health::Health::StubInterface::Check));
+                   call_with<health::HealthCheckResponse>(
+                       *connection_->router, connection_->repeatable(),
+                       [&](const ServerLinks& server, grpc::ClientContext& context, auto& reply) {
+                         return health::Health::NewStub(server.latency.channel)->Check(&context, request, &reply);
+                       }));
   const int status = response.status();
   return health::HealthCheckResponse::ServingStatus_IsValid(status) ? static_cast<Health>(status) : Health::kUnknown;
 }
 
 absl::StatusOr<BackupSize> Client::backup(BackupSink& sink) const {
-  ASSIGN_OR_RETURN(const CallGate::Permit permit, CallGate::enter(connection_->bulk.gate));
-  const std::unique_ptr<v1::ServerService::StubInterface> server =
-      v1::ServerService::NewStub(connection_->bulk.channel);
-  return download_backup(*server, sink, connection_->bulk_header(connection_->options.backup_deadline));
+  absl::StatusOr<BackupSize> size = absl::UnknownError("not asked yet");
+  const auto invoke = [&](const ServerLinks& server, const CallHeader& header) {
+    size = download_backup(*v1::ServerService::NewStub(server.bulk.channel), sink, header);
+    return absl::OkStatus();  // not repeated, since the sink has been used
+  };
+  RETURN_IF_ERROR(connection_->run_transfer(connection_->transfer(connection_->options.backup_deadline), invoke));
+  return size;
 }
 
 absl::StatusOr<v1::MoveSceneResponse> Client::move_scene(const v1::MoveSceneRequest& request) const {
@@ -221,15 +213,18 @@ absl::StatusOr<v1::MoveSceneResponse> Client::move_scene(const v1::MoveSceneRequ
 }
 
 absl::StatusOr<v1::Scene> Client::create_scene(const v1::CreateSceneRequest& request) const {
-  ASSIGN_OR_RETURN(v1::CreateSceneResponse response, call(*connection_->scenes, connection_->once(request.name()),
-                                                          request, &v1::SceneService::StubInterface::CreateScene));
+  CallPlan plan = connection_->once(request.name());
+  plan.route = request.spec().static_from();
+  ASSIGN_OR_RETURN(v1::CreateSceneResponse response, call(*connection_->router, plan, &ServerLinks::scenes, request,
+                                                          &v1::SceneService::StubInterface::CreateScene));
   return std::move(*response.mutable_scene());
 }
 
 absl::StatusOr<v1::GetSceneResponse> Client::describe_scene(absl::string_view name) const {
   v1::GetSceneRequest request;
   request.set_name(std::string(name));
-  return call(*connection_->scenes, connection_->repeatable(name), request, &v1::SceneService::StubInterface::GetScene);
+  return call(*connection_->router, connection_->repeatable(name), &ServerLinks::scenes, request,
+              &v1::SceneService::StubInterface::GetScene);
 }
 
 absl::StatusOr<v1::Scene> Client::get_scene(absl::string_view name) const {
@@ -242,8 +237,9 @@ absl::StatusOr<std::vector<v1::Scene>> Client::list_scenes(const std::map<std::s
   request.mutable_labels()->insert(labels.begin(), labels.end());
   std::vector<v1::Scene> scenes;
   do {
-    ASSIGN_OR_RETURN(v1::ListScenesResponse page, call(*connection_->scenes, connection_->repeatable(), request,
-                                                       &v1::SceneService::StubInterface::ListScenes));
+    ASSIGN_OR_RETURN(v1::ListScenesResponse page,
+                     call(*connection_->router, connection_->repeatable(), &ServerLinks::scenes, request,
+                          &v1::SceneService::StubInterface::ListScenes));
     for (v1::Scene& scene : *page.mutable_scenes()) scenes.push_back(std::move(scene));
     request.set_page_token(page.next_page_token());
   } while (!request.page_token().empty());
@@ -251,34 +247,38 @@ absl::StatusOr<std::vector<v1::Scene>> Client::list_scenes(const std::map<std::s
 }
 
 absl::StatusOr<v1::UpdateSceneResponse> Client::update_scene(const v1::UpdateSceneRequest& request) const {
-  return call(*connection_->scenes, connection_->once(request.name()), request,
+  return call(*connection_->router, connection_->once(request.name()), &ServerLinks::scenes, request,
               &v1::SceneService::StubInterface::UpdateScene);
 }
 
 absl::Status Client::delete_scene(const v1::DeleteSceneRequest& request) const {
-  return call(*connection_->scenes, connection_->once(request.name()), request,
-              &v1::SceneService::StubInterface::DeleteScene)
-      .status();
+  const absl::Status status = call(*connection_->router, connection_->once(request.name()), &ServerLinks::scenes,
+                                   request, &v1::SceneService::StubInterface::DeleteScene)
+                                  .status();
+  if (status.ok() && connection_->router->routes() != nullptr) connection_->router->routes()->forget(request.name());
+  return status;
 }
 
 absl::StatusOr<v1::UploadMeshResponse> Client::upload_mesh(const MeshColumns& mesh,
                                                            const UploadProgress& progress) const {
-  ASSIGN_OR_RETURN(const CallGate::Permit permit, CallGate::enter(connection_->bulk.gate));
-  return locus::client::upload_mesh(*connection_->transfers, mesh,
-                                    connection_->bulk_header(connection_->options.long_deadline), progress);
+  absl::StatusOr<v1::UploadMeshResponse> response = absl::UnknownError("not sent yet");
+  const auto invoke = [&](const ServerLinks& server, const CallHeader& header) {
+    response = locus::client::upload_mesh(*server.transfers, mesh, header, progress);
+    return response.status();
+  };
+  RETURN_IF_ERROR(connection_->run_transfer(connection_->transfer(connection_->options.long_deadline), invoke));
+  return response;
 }
 
 absl::StatusOr<DownloadedMesh> Client::download_mesh(absl::string_view name, const DownloadProgress& progress) const {
-  const CallHeader header = connection_->bulk_header(connection_->options.long_deadline);
   absl::StatusOr<DownloadedMesh> mesh = absl::UnknownError("not asked yet");
-  const auto attempt = [&]() -> absl::Status {
-    ASSIGN_OR_RETURN(const CallGate::Permit permit, CallGate::enter(connection_->bulk.gate));
-    continue_connecting(connection_->bulk, header.deadline);
-    mesh = locus::client::download_mesh(*connection_->transfers, name, header, progress);
+  const auto invoke = [&](const ServerLinks& server, const CallHeader& header) {
+    mesh = locus::client::download_mesh(*server.transfers, name, header, progress);
     return mesh.status();
   };
-  RETURN_IF_ERROR(with_retries(connection_->options.retry, header.deadline, attempt,
-                               [&](absl::Duration duration) { wait_connecting(connection_->bulk, duration); }));
+  CallPlan plan = connection_->transfer(connection_->options.long_deadline);
+  plan.repeat = Repeat::kWhenUnavailable;
+  RETURN_IF_ERROR(connection_->run_transfer(plan, invoke));
   return mesh;
 }
 
@@ -287,8 +287,9 @@ absl::Status Client::read_more_parts(v1::Mesh& mesh) const {
   request.set_mesh(mesh.name());
   while (static_cast<uint32_t>(mesh.parts_size()) < mesh.part_count()) {
     request.set_first_part(static_cast<uint32_t>(mesh.parts_size()));
-    ASSIGN_OR_RETURN(v1::ListMeshesResponse page, call(*connection_->scenes, connection_->repeatable(), request,
-                                                       &v1::SceneService::StubInterface::ListMeshes));
+    ASSIGN_OR_RETURN(v1::ListMeshesResponse page,
+                     call(*connection_->router, connection_->repeatable(), &ServerLinks::scenes, request,
+                          &v1::SceneService::StubInterface::ListMeshes));
     if (page.meshes_size() != 1 || page.meshes(0).sha256() != mesh.sha256() || page.meshes(0).parts().empty() ||
         page.meshes(0).part_count() != mesh.part_count())
       return absl::AbortedError(absl::StrCat("mesh ", mesh.name(), " was replaced while its parts were read"));
@@ -301,8 +302,9 @@ absl::StatusOr<v1::Mesh> Client::get_mesh(absl::string_view name) const {
   v1::ListMeshesRequest request;
   request.set_mesh(std::string(name));
   do {
-    ASSIGN_OR_RETURN(v1::ListMeshesResponse page, call(*connection_->scenes, connection_->repeatable(), request,
-                                                       &v1::SceneService::StubInterface::ListMeshes));
+    ASSIGN_OR_RETURN(v1::ListMeshesResponse page,
+                     call(*connection_->router, connection_->repeatable(), &ServerLinks::scenes, request,
+                          &v1::SceneService::StubInterface::ListMeshes));
     // An older server ignores the name in the request and lists all meshes.
     for (v1::Mesh& mesh : *page.mutable_meshes()) {
       if (mesh.name() != name) continue;
@@ -319,8 +321,9 @@ absl::StatusOr<std::vector<v1::Mesh>> Client::list_meshes(MeshParts parts) const
   request.set_without_parts(parts == MeshParts::kNone);
   std::vector<v1::Mesh> meshes;
   do {
-    ASSIGN_OR_RETURN(v1::ListMeshesResponse page, call(*connection_->scenes, connection_->repeatable(), request,
-                                                       &v1::SceneService::StubInterface::ListMeshes));
+    ASSIGN_OR_RETURN(v1::ListMeshesResponse page,
+                     call(*connection_->router, connection_->repeatable(), &ServerLinks::scenes, request,
+                          &v1::SceneService::StubInterface::ListMeshes));
     for (v1::Mesh& mesh : *page.mutable_meshes()) {
       if (parts == MeshParts::kAll) {
         const absl::Status status = read_more_parts(mesh);
@@ -337,42 +340,57 @@ absl::StatusOr<std::vector<v1::Mesh>> Client::list_meshes(MeshParts parts) const
 absl::Status Client::delete_mesh(absl::string_view name) const {
   v1::DeleteMeshRequest request;
   request.set_mesh(std::string(name));
-  return call(*connection_->scenes, connection_->once(), request, &v1::SceneService::StubInterface::DeleteMesh)
+  return call(*connection_->router, connection_->once(), &ServerLinks::scenes, request,
+              &v1::SceneService::StubInterface::DeleteMesh)
       .status();
 }
 
-void Client::cancel_calls() const { connection_->running->cancel_all(); }
+void Client::cancel_calls() const { connection_->router->running().cancel_all(); }
 
 absl::StatusOr<v1::ChangeInstancesResponse> Client::change_instances(const v1::ChangeInstancesRequest& request) const {
   CallPlan plan = connection_->once(request.scene());
   plan.deadline = connection_->options.long_deadline;
-  return call(*connection_->scenes, plan, request, &v1::SceneService::StubInterface::ChangeInstances);
+  return call(*connection_->router, plan, &ServerLinks::scenes, request,
+              &v1::SceneService::StubInterface::ChangeInstances);
 }
 
 absl::Status Client::dump(const v1::DumpSceneRequest& request,
                           const std::function<absl::Status(const v1::DumpSceneResponse&)>& on_message) const {
-  ASSIGN_OR_RETURN(const CallGate::Permit permit, CallGate::enter(connection_->bulk.gate));
-  CancellableContext context(connection_->running.get());
-  prepare(context, connection_->bulk_header(connection_->options.long_deadline, request.scene()));
-  const auto reader = connection_->transfers->DumpScene(&context, request);
-  v1::DumpSceneResponse response;
-  absl::Status accepted;
+  absl::Status accepted, end;
   bool arrived = false;
-  while (accepted.ok() && reader->Read(&response)) {
-    arrived = true;
-    accepted = on_message(response);
-  }
-  if (!accepted.ok()) context.TryCancel();
-  const absl::Status end = to_absl_status(reader->Finish());
+  const auto invoke = [&](const ServerLinks& server, const CallHeader& header) {
+    CancellableContext context(header.running);
+    prepare(context, header);
+    const auto reader = server.transfers->DumpScene(&context, request);
+    v1::DumpSceneResponse response;
+    while (accepted.ok() && reader->Read(&response)) {
+      arrived = true;
+      accepted = on_message(response);
+    }
+    if (!accepted.ok()) context.TryCancel();
+    end = to_absl_status(reader->Finish());
+    return arrived ? absl::OkStatus() : end;  // not repeated once messages have been passed on
+  };
+  const CallPlan plan = connection_->transfer(connection_->options.long_deadline, request.scene());
+  if (absl::Status status = connection_->run_transfer(plan, invoke); !status.ok()) end = std::move(status);
   return accepted.ok() ? outcome_of_query(end, request.scene(), arrived ? v1::View() : request.view()) : accepted;
+}
+
+absl::StatusOr<v1::MoveSceneResponse> Client::move_scene(const v1::MoveSceneRequest& request) const {
+  return call(*connection_->router, connection_->once(request.scene()), &ServerLinks::servers, request,
+              &v1::ServerService::StubInterface::MoveScene);
 }
 
 absl::StatusOr<std::string> Client::call_by_path(const std::string& path, absl::string_view request,
                                                  absl::string_view scene) const {
-  PathMethod method(connection_->latency.channel, path);
   const grpc::Slice slice(request.data(), request.size());
-  ASSIGN_OR_RETURN(const grpc::ByteBuffer response,
-                   call(method, connection_->once(scene), grpc::ByteBuffer(&slice, 1), &PathMethod::run));
+  ASSIGN_OR_RETURN(
+      const grpc::ByteBuffer response,
+      call_with<grpc::ByteBuffer>(
+          *connection_->router, connection_->once(scene),
+          [&](const ServerLinks& server, grpc::ClientContext& context, grpc::ByteBuffer& reply) {
+            return PathMethod(server.latency.channel, path).run(&context, grpc::ByteBuffer(&slice, 1), &reply);
+          }));
   std::vector<grpc::Slice> slices;
   if (!response.Dump(&slices).ok()) return absl::DataLossError("the answer cannot be read");
   std::string bytes;
@@ -385,8 +403,9 @@ absl::StatusOr<v1::UpdateAck> Client::apply(absl::string_view scene, v1::UpdateB
   v1::ApplyUpdatesRequest request;
   request.set_scene(std::string(scene));
   *request.mutable_batch() = std::move(batch);
-  ASSIGN_OR_RETURN(v1::ApplyUpdatesResponse response,
-                   call(*connection_->updates, plan, request, &v1::UpdateService::StubInterface::ApplyUpdates));
+  ASSIGN_OR_RETURN(v1::ApplyUpdatesResponse response, call(*connection_->router, plan, &ServerLinks::updates, request,
+                                                           &v1::UpdateService::StubInterface::ApplyUpdates));
+  connection_->saw(scene, response.ack());
   return std::move(*response.mutable_ack());
 }
 
@@ -394,9 +413,16 @@ absl::StatusOr<v1::QueryResult> Client::query(absl::string_view scene, v1::Query
   v1::QueryRequest request;
   request.set_scene(std::string(scene));
   *request.mutable_batch() = std::move(batch);
-  absl::StatusOr<v1::QueryResponse> response =
-      call(*connection_->queries, connection_->repeatable(scene), request, &v1::QueryService::StubInterface::Query);
-  RETURN_IF_ERROR(outcome_of_query(response.status(), scene, request.batch().view()));
+  const v1::View view = request.batch().view();
+  std::optional<Reading> reading = connection_->router->reading(scene, view);
+  const auto invoke = [&](const ServerLinks& server, grpc::ClientContext& context, v1::QueryResponse& reply) {
+    if (reading) *request.mutable_batch()->mutable_view() = reading->next_view();
+    return server.queries->Query(&context, request, &reply);
+  };
+  absl::StatusOr<v1::QueryResponse> response = call_with<v1::QueryResponse>(
+      *connection_->router, connection_->repeatable(scene), invoke, reading ? &*reading : nullptr);
+  RETURN_IF_ERROR(outcome_of_query(response.status(), scene, view));
+  if (reading) reading->answered({response->result().epoch(), response->result().revision()});
   return std::move(*response->mutable_result());
 }
 
@@ -406,20 +432,19 @@ absl::StatusOr<StepResult> Client::step(absl::string_view scene, v1::UpdateBatch
   request.set_scene(std::string(scene));
   *request.mutable_update() = std::move(update);
   *request.mutable_queries() = std::move(queries);
-  ASSIGN_OR_RETURN(v1::StepResponse response,
-                   call(*connection_->queries, plan, request, &v1::QueryService::StubInterface::Step));
+  ASSIGN_OR_RETURN(v1::StepResponse response, call(*connection_->router, plan, &ServerLinks::queries, request,
+                                                   &v1::QueryService::StubInterface::Step));
+  connection_->saw(scene, response.ack());
   if (response.has_error()) return StepResult{std::move(*response.mutable_ack()), to_absl_status(response.error())};
   return StepResult{std::move(*response.mutable_ack()), std::move(*response.mutable_result())};
 }
 
 std::unique_ptr<UpdateStream> Client::update_stream(absl::string_view scene, const UpdateStreamOptions& options) const {
-  return std::make_unique<UpdateStream>(connection_->link_of(options.lane), connection_->authorization,
-                                        std::string(scene), options);
+  return std::make_unique<UpdateStream>(connection_->router, std::string(scene), options);
 }
 
 std::unique_ptr<QueryStream> Client::query_stream(absl::string_view scene, const QueryStreamOptions& options) const {
-  return std::make_unique<QueryStream>(connection_->link_of(options.lane), connection_->authorization,
-                                       std::string(scene), options);
+  return std::make_unique<QueryStream>(connection_->router, std::string(scene), options);
 }
 
 }  // namespace locus::client

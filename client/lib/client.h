@@ -15,6 +15,10 @@
 // apply() and step() do so only if the update has `writer` and `batch`, by which the server recognizes a repeated
 // batch. In addition, if the server refuses the token of a unary call, and the token file then contains a new token,
 // the call is repeated with the new token.
+//
+// The client of a cluster also repeats every call that a server refused because another one leads the scene, or because
+// it shuts down: such a call has changed nothing. The revisions that it sees of a scene never decrease: queries that
+// name no revision wait for the highest one that it has seen.
 #ifndef LOCUS_CLIENT_LIB_CLIENT_H_
 #define LOCUS_CLIENT_LIB_CLIENT_H_
 
@@ -70,6 +74,12 @@ class Client {
   // sent unencrypted to another machine (see CredentialOptions::allow_token_without_tls).
   static absl::StatusOr<std::unique_ptr<Client>> connect(absl::string_view address = kDefaultAddress,
                                                          const ClientOptions& options = {});
+  // Connects to a cluster by the addresses of some of its servers; connect() does the same with addresses that are
+  // separated by commas. Each call and stream goes to the server that leads its scene, which other servers name, and to
+  // the next server when one fails (see ClusterOptions). Blocks until one of the addresses answers. Returns
+  // INVALID_ARGUMENT without an address, otherwise the errors of connect(); UNAVAILABLE names all addresses.
+  static absl::StatusOr<std::unique_ptr<Client>> connect_cluster(const std::vector<std::string>& addresses,
+                                                                 const ClientOptions& options = {});
   // Returns a client over `channel`, a channel to a server in the same process (grpc::Server::InProcessChannel). Both
   // lanes use this channel. The server must close `gate` before it shuts down (client/lib/call_gate.h). The
   // credentials, connect_timeout, wait_for_server and message sizes of `options` have no effect: the channel has none
@@ -80,7 +90,8 @@ class Client {
   Client(const Client&) = delete;
   Client& operator=(const Client&) = delete;
 
-  // Returns the server's address, including the port; `in-process` for a client of in_process().
+  // Returns the server's address, including the port; `in-process` for a client of in_process(); the given addresses of
+  // a cluster, joined by commas.
   const std::string& address() const;
 
   // Returns the server's version, features and limits. Retried.
@@ -109,6 +120,9 @@ class Client {
   absl::StatusOr<std::vector<v1::Scene>> list_scenes(const std::map<std::string, std::string>& labels = {}) const;
   absl::StatusOr<v1::UpdateSceneResponse> update_scene(const v1::UpdateSceneRequest& request) const;
   absl::Status delete_scene(const v1::DeleteSceneRequest& request) const;
+
+  // Moves the leadership of a scene to another server of the cluster. Not retried.
+  absl::StatusOr<v1::MoveSceneResponse> move_scene(const v1::MoveSceneRequest& request) const;
 
   // Uploads a mesh in messages of at most 1 MiB. The first message has the mesh's SHA-256 and all parts of the mesh, so
   // it can be larger. The upload stops as soon as the server answers; thus a mesh that the server already has is not

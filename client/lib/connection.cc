@@ -73,7 +73,8 @@ absl::StatusOr<std::shared_ptr<grpc::ChannelCredentials>> channel_credentials(co
 }
 
 std::shared_ptr<grpc::Channel> open_channel(const std::string& target, const ClientOptions& options,
-                                            const std::shared_ptr<grpc::ChannelCredentials>& credentials) {
+                                            const std::shared_ptr<grpc::ChannelCredentials>& credentials,
+                                            ChannelUse use) {
   constexpr int kFirstReconnectMs = 100;
   constexpr int kMaxReconnectMs = 2000;
   grpc::ChannelArguments arguments;
@@ -82,6 +83,15 @@ std::shared_ptr<grpc::Channel> open_channel(const std::string& target, const Cli
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
   arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, kFirstReconnectMs);
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, kMaxReconnectMs);
+  if (use == ChannelUse::kMember) {
+    constexpr int kMaxConnectingMs = 1000;
+    constexpr int kPingEveryMs = 6000;  // servers accept a ping every 5 s
+    constexpr int kPingAnswerMs = 2000;
+    arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, kMaxConnectingMs);
+    arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, kPingEveryMs);
+    arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kPingAnswerMs);
+    arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
+  }
   // Ignore a proxy set in the environment: a proxy on another machine cannot reach this machine's loopback interface.
   if (stays_on_this_machine(target)) arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
   const std::string& server_name = options.credentials.server_name;

@@ -36,8 +36,12 @@ absl::StatusOr<std::shared_ptr<grpc::ChannelCredentials>> channel_credentials(co
 
 // Returns a channel to `target`. The channel does not connect yet. It shares its connection with no other channel of
 // this process, so that each channel of a client has its own socket.
+// `use`: a channel to a member of a cluster, whose machine may vanish without a word, gives up a server that does not
+// answer pings.
+enum class ChannelUse { kOnlyServer, kMember };
 std::shared_ptr<grpc::Channel> open_channel(const std::string& target, const ClientOptions& options,
-                                            const std::shared_ptr<grpc::ChannelCredentials>& credentials);
+                                            const std::shared_ptr<grpc::ChannelCredentials>& credentials,
+                                            ChannelUse use = ChannelUse::kOnlyServer);
 
 // Waits until the channel is connected. Returns UNAVAILABLE naming `target` if options.connect_timeout has passed, or
 // if the connection is refused and options.wait_for_server is false. If a server answers but the TLS handshake fails,

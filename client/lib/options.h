@@ -29,6 +29,31 @@ enum class Lane {
   kBulk,     // large messages: streams by default, uploads, downloads, dumps, backups
 };
 
+// Servers of a cluster that answer the queries of a client. With each of them, the revisions that a client sees of a
+// scene never decrease, and a query sees every update that the client was acknowledged before.
+enum class ReadFrom {
+  // The leader of the scene: a query also sees every update that other clients were acknowledged before it was sent.
+  // Queries wait while no server leads the scene.
+  kLeader,
+  // The leader or a follower, chosen at random for each scene and kept while it answers. Queries continue while no
+  // server leads the scene.
+  kAny,
+  // A follower, chosen likewise, so that the leader has time for updates; the leader if the scene has no follower.
+  kFollower,
+};
+
+// Options of a client with several addresses, which replace ClientOptions::deadline and ClientOptions::retry. By
+// default a call lasts longer than a takeover, in which another server becomes the leader of the scenes of a lost one
+// within about 8 s.
+struct ClusterOptions {
+  // Servers that answer queries.
+  ReadFrom read_from = ReadFrom::kLeader;
+  // Maximum duration of a call including its retries.
+  absl::Duration deadline = absl::Seconds(30);
+  // Retries of calls, and reconnection of streams whose own policy has fewer attempts.
+  RetryPolicy retry = {.max_attempts = 45, .max_backoff = absl::Milliseconds(500)};
+};
+
 // Options for the encryption of a connection, and the credentials of the client. Certificates and keys are files in PEM
 // format, which connect() reads.
 struct CredentialOptions {
@@ -76,6 +101,8 @@ struct ClientOptions {
   // Retries of unary calls that change nothing, of mesh downloads, and of updates that carry `writer` and `batch`.
   // Other calls are repeated only because of a new token (see CredentialOptions::token).
   RetryPolicy retry;
+  // Options of a client with several addresses.
+  ClusterOptions cluster;
 };
 
 // Limits of the number of items that a QueryBatcher or MoveBatcher gathers into one message, and of the time for which

@@ -10,6 +10,10 @@
 // With Options::renewal, the stream sends a request of its own (Kind::renewal()) when no request that renews the lease
 // was sent for that long. Renewals begin with the first such request and end when the stream is closed.
 //
+// In a cluster, each call goes to the server that leads the scene or, for a stream that sends queries only, to a reader
+// of it. A request that a server refuses because another one leads the scene is not answered: the stream opens a call
+// to that server and sends all unanswered requests again.
+//
 // Threads: each stream owns one thread, the supervisor, which starts one call after another and waits for the end of
 // each call. Messages are read and written on gRPC's callback threads. send(), flush() and close() may be called from
 // any thread. Callbacks run one at a time, without the lock held.
@@ -42,7 +46,9 @@
 #include "client/lib/authorization.h"
 #include "client/lib/connection.h"
 #include "client/lib/retry.h"
+#include "client/lib/router.h"
 #include "client/lib/status.h"
+#include "client/lib/writer.h"
 #include "core/base/status_macros.h"
 #include "grpcpp/channel.h"
 #include "grpcpp/client_context.h"
@@ -71,7 +77,10 @@ class PipelinedStream {
     // Messages that are written before `request`, and the number of them whose write on the current call has begun.
     std::vector<std::shared_ptr<Request>> held = {};
     size_t held_written = 0;
-    absl::Status refusal = {};  // the first error among the answers to `held` on the current call
+    absl::Status refusal = {};            // the first error among the answers to `held` on the current call
+    std::optional<Reading> reading = {};  // for a query to a cluster
+    bool began = false;                   // whether a write of `request` has begun on any call
+    bool unapplied = false;               // whether the server of the current call did not apply the request
   };
   using Items = std::deque<Item>;
 
@@ -79,7 +88,12 @@ class PipelinedStream {
   class Kind {
    public:
     virtual ~Kind() = default;
-    virtual void start_call(grpc::ClientContext* context, Reactor* reactor) = 0;
+    // Starts a call to `server`, which outlives it.
+    virtual void start_call(const ServerLinks& server, grpc::ClientContext* context, Reactor* reactor) = 0;
+    // Returns the view of a request without an update; null for a request with one.
+    virtual v1::View* view_of(Request&) { return nullptr; }
+    // Returns the revision that a result shows.
+    virtual Revision revision_of(const Result& result) const = 0;
     // Assigns, for updates, the writer and batch number of a new request's batch.
     virtual void number(Request& request) = 0;
     // Returns the request that renews the writer's lease.
@@ -100,11 +114,11 @@ class PipelinedStream {
   };
 
   struct Options {
-    Link link;  // link of the stream's calls
+    std::shared_ptr<Router> router;
+    Lane lane;
     int max_in_flight;
     RetryPolicy reconnect;
     absl::Duration patience;  // maximum time without any response while requests are unanswered
-    std::shared_ptr<Authorization> authorization;
     absl::Duration renewal = absl::InfiniteDuration();  // maximum time without a request that renews the lease
   };
 
@@ -114,9 +128,10 @@ class PipelinedStream {
         scene_(std::move(scene)),
         max_in_flight_(static_cast<size_t>(std::max(1, options.max_in_flight))),
         patience_(absl::ToChronoNanoseconds(options.patience)),
-        backoff_(options.reconnect),
-        link_(options.link),
-        authorization_(options.authorization),
+        backoff_(policy_of(options)),
+        router_(options.router),
+        lane_(options.lane),
+        server_(router_->first()),
         renewal_(absl::ToChronoNanoseconds(options.renewal)),
         supervisor_([this] { supervise(); }) {}
 
@@ -188,6 +203,15 @@ class PipelinedStream {
   // Maximum duration of one wait on the condition variable; the caller then waits again. The maximum is needed because
   // the end of the wait would overflow if the patience is unlimited.
   static constexpr std::chrono::hours kLongestWait{1};
+  // Maximum number of servers of a cluster that are tried in a row without a wait.
+  static constexpr int kMaxHops = 8;
+
+  // Returns the policy of reconnection: in a cluster, one that outlasts a takeover.
+  static RetryPolicy policy_of(const Options& options) {
+    const RetryPolicy& cluster = options.router->options().retry;
+    const bool longer = options.router->routes() != nullptr && cluster.max_attempts > options.reconnect.max_attempts;
+    return longer ? cluster : options.reconnect;
+  }
 
   // One gRPC call. A hold (AddHold) prevents gRPC from finishing the call while other threads may still start writes.
   // OnReadDone() removes the hold when a read fails, which means that the call has ended. The stream's lock guards all
@@ -196,10 +220,10 @@ class PipelinedStream {
    public:
     explicit Attempt(PipelinedStream& stream)
         : stream_(stream),
-          token_(prepare(context_, {.authorization = *stream.authorization_, .scene = stream.scene_})) {}
+          token_(prepare(context_, {.authorization = *stream.server_->authorization, .scene = stream.scene_})) {}
 
     void start() {
-      stream_.kind_.start_call(&context_, this);
+      stream_.kind_.start_call(*stream_.server_, &context_, this);
       this->StartRead(&response_);
       this->AddHold();
       this->StartCall();
@@ -265,10 +289,17 @@ class PipelinedStream {
     item.request->set_scene(scene_);
     item.request->set_sequence(++sequence_);
     kind_.number(*item.request);
+    if (router_->routes() != nullptr) choose_reading(item);
     if (items_.empty()) last_response_ = Clock::now();
     items_.push_back(std::move(item));
     pump();
     changed_.notify_all();
+  }
+
+  // Decides which server of the cluster may answer an item.
+  void choose_reading(Item& item) {
+    if (const v1::View* const view = kind_.view_of(*item.request)) item.reading = router_->reading(scene_, *view);
+    needs_leader_ |= !item.reading || item.reading->leader();
   }
 
   // Returns the time after `wait`, or the maximum if it would overflow.
@@ -288,19 +319,27 @@ class PipelinedStream {
   // Starts writing the next unwritten message. If the stream is closing and all requests are answered, ends the writes
   // of the call instead. Does nothing while a write is in progress. Precondition: the caller holds the lock.
   void pump() {
-    if (!attempt_ || !attempt_->writable()) return;
+    if (!attempt_ || !attempt_->writable() || !moved_.ok()) return;
     const auto next = std::find_if(items_.begin(), items_.end(), [](const Item& item) { return !item.written; });
     if (group_end_) {
       attempt_->write(std::exchange(group_end_, nullptr));
     } else if (next != items_.end() && next->held_written < next->held.size()) {
       attempt_->write(next->held[next->held_written++]);
     } else if (next != items_.end()) {
-      next->written = true;
+      set_view(*next);
+      next->written = next->began = true;
       attempt_->write(next->request);
     } else if (closing_ && items_.empty()) {
       attempt_->end_writes();
     }
     assert(check_invariants());
+  }
+
+  // Sets the view of a query to a cluster, just before the query is written.
+  void set_view(Item& item) {
+    if (!item.reading) return;
+    if (item.began) item.request = std::make_shared<Request>(*item.request);
+    *kind_.view_of(*item.request) = item.reading->next_view();
   }
 
   // Returns whether the invariants in the file comment hold. O(items). Precondition: the caller holds the lock.
@@ -330,10 +369,16 @@ class PipelinedStream {
     if (item == items_.end()) return;
     if (!answers(item->request)) return receive_held(*item, response);
     const size_t position = static_cast<size_t>(item - items_.begin());
-    backoff_.reset();
+    if (!moved_.ok()) return;
     last_response_ = Clock::now();
     absl::StatusOr<Result> outcome = kind_.outcome_of(response);
     if (!item->refusal.ok()) outcome = item->refusal;
+    if (router_->routes() != nullptr && !outcome.ok() && moves_to_other_server(outcome.status()))
+      return move(position, outcome.status());
+    backoff_.reset();
+    hops_ = 0;
+    if (item->reading && !outcome.ok() && item->reading->turns_to_leader(outcome.status())) return ask_again(position);
+    note_revision(*item, outcome);
     if (kind_.goes_again(*item, outcome)) {
       number_again(items_, position);
       return pump();
@@ -347,6 +392,39 @@ class PipelinedStream {
       attempt_->cancel();
     }
     complete(lock, answered.done, std::move(outcome));
+  }
+
+  // Ends the call, to continue at another server, since the item at `position` was refused with `failure`.
+  void move(size_t position, const absl::Status& failure) {
+    moved_ = failure;
+    Item& refused = items_[position];
+    if (refused.reading && absl::IsFailedPrecondition(failure)) {
+      refused.reading->ask_leader();  // a follower that is older than the view admits
+      needs_leader_ = true;
+    }
+    // The server applied neither this update nor a later one, whose number would have left a gap.
+    if (!refused.reading && refused_by_server(failure) && !refused.sent_before)
+      for (size_t i = position; i < items_.size(); ++i) items_[i].unapplied = true;
+    attempt_->cancel();
+    changed_.notify_all();
+  }
+
+  // Sends the query at `position` again, on the same call.
+  void ask_again(size_t position) {
+    Item again = std::move(items_[position]);
+    items_.erase(items_.begin() + static_cast<std::ptrdiff_t>(position));
+    again.written = false;
+    const auto unwritten = std::find_if(items_.begin(), items_.end(), [](const Item& item) { return !item.written; });
+    items_.insert(unwritten, std::move(again));
+    pump();
+  }
+
+  // Notes the revision that a result shows.
+  void note_revision(Item& item, const absl::StatusOr<Result>& outcome) {
+    if (router_->routes() == nullptr || !outcome.ok()) return;
+    const Revision revision = kind_.revision_of(*outcome);
+    if (item.reading) return item.reading->answered(revision);
+    router_->routes()->saw(scene_, revision, /*from_leader=*/true);
   }
 
   void complete(std::unique_lock<std::mutex>& lock, Callback& done, absl::StatusOr<Result> outcome) {
@@ -371,7 +449,7 @@ class PipelinedStream {
           changed_.wait_for(lock, absl::ToChronoNanoseconds(*wait), [this] { return broken_off_; });
           if (broken_off_) continue;
           lock.unlock();
-          continue_connecting(link_, absl::InfiniteFuture());
+          continue_connecting(server_->link_of(lane_), absl::InfiniteFuture());
           lock.lock();
           continue;
         }
@@ -383,14 +461,17 @@ class PipelinedStream {
   }
 
   absl::Status run_attempt(std::unique_lock<std::mutex>& lock) {
+    RETURN_IF_ERROR(choose_server(lock));
+    if (broken_off_) return absl::CancelledError("the stream was broken off");
     for (Item& item : items_) {
-      item.sent_before |= std::exchange(item.written, false);
+      const bool unapplied = std::exchange(item.unapplied, false);
+      item.sent_before |= std::exchange(item.written, false) && !unapplied;
       item.held_written = 0;
       item.refusal = absl::OkStatus();
     }
     group_end_.reset();
     {
-      ASSIGN_OR_RETURN(const CallGate::Permit permit, CallGate::enter(link_.gate));
+      ASSIGN_OR_RETURN(const CallGate::Permit permit, CallGate::enter(server_->link_of(lane_).gate));
       attempt_ = std::make_unique<Attempt>(*this);
       attempt_->start();
     }
@@ -402,13 +483,27 @@ class PipelinedStream {
     attempt_.reset();
     RETURN_IF_ERROR(fatal_);
     if (broken_off_) return absl::CancelledError("the stream was broken off");
+    if (!moved_.ok()) return std::exchange(moved_, absl::OkStatus());
     if (closing_ && items_.empty()) return absl::OkStatus();
     if (silent) return absl::UnavailableError("the server answered nothing for as long as the stream is patient");
     if (end.ok()) return absl::UnavailableError("the server ended the stream before it had answered everything");
-    if (absl::IsUnauthenticated(end) && authorization_->has_newer(token)) {
+    if (absl::IsUnauthenticated(end) && server_->authorization->has_newer(token)) {
       return absl::UnavailableError(absl::StrCat("the token has changed: ", end.message()));
     }
     return end;
+  }
+
+  // Chooses the server of the next call.
+  absl::Status choose_server(std::unique_lock<std::mutex>& lock) {
+    if (router_->routes() == nullptr) return absl::OkStatus();
+    const std::optional<Reading> reading = needs_leader_ ? std::nullopt : router_->reading(scene_, {});
+    lock.unlock();
+    absl::StatusOr<std::shared_ptr<const ServerLinks>> server =
+        router_->server_for(scene_, reading ? &*reading : nullptr);
+    lock.lock();
+    RETURN_IF_ERROR(server.status());
+    server_ = *std::move(server);
+    return absl::OkStatus();
   }
 
   // Waits for the end of the current call and returns true. If no response arrives for `patience_` while requests are
@@ -438,17 +533,32 @@ class PipelinedStream {
   // Returns the wait before the next call. Returns nothing if the stream must end with `end` instead of opening another
   // call. If the connection is lost while all requests are answered, the loss does not count as a failure.
   std::optional<absl::Duration> wait_before_next(const absl::Status& end) {
-    if (broken_off_ || !fatal_.ok() || end.ok() || !worth_reconnecting(end)) return std::nullopt;
+    if (broken_off_ || !fatal_.ok() || end.ok()) return std::nullopt;
+    const bool in_cluster = router_->routes() != nullptr;
+    if (!worth_reconnecting(end) && !(in_cluster && moves_to_other_server(end))) return std::nullopt;
+    const bool follow = in_cluster && router_->note(scene_, server_->target, end);
     if (items_.empty()) return absl::ZeroDuration();
+    if (follow && hops_ < kMaxHops) {
+      ++hops_;
+      return absl::ZeroDuration();
+    }
+    hops_ = 0;
     return backoff_.after_failure(end);
   }
 
   void finish(std::unique_lock<std::mutex>& lock, const absl::Status& end) {
-    ended_ = end;
+    ended_ = broken_off_ ? end : router_->gave_up(end);
     Items unanswered = std::exchange(items_, Items());
     assert(check_invariants());
-    for (Item& item : unanswered) complete(lock, item.done, end);
+    for (Item& item : unanswered) complete(lock, item.done, end_of(item));
     changed_.notify_all();
+  }
+
+  // Returns the error of an unanswered item. The server whose refusal ended the stream of a cluster may not be the one
+  // to which an update was sent before.
+  absl::Status end_of(const Item& item) const {
+    const bool unknown = router_->routes() != nullptr && !item.reading && item.began && moves_to_other_server(*ended_);
+    return unknown && refused_by_server(*ended_) ? outcome_unknown(*ended_) : *ended_;
   }
 
   absl::Status why_ended() const {
@@ -464,8 +574,12 @@ class PipelinedStream {
   std::mutex mutex_;
   std::condition_variable changed_;
   Backoff backoff_;
-  const Link link_;
-  const std::shared_ptr<Authorization> authorization_;
+  const std::shared_ptr<Router> router_;
+  const Lane lane_;
+  std::shared_ptr<const ServerLinks> server_;  // of the current call; used by the supervisor and the call
+  absl::Status moved_;                         // error that moves the stream to another server
+  bool needs_leader_ = false;                  // whether updates or queries for the leader were sent
+  int hops_ = 0;                               // calls of other servers in a row without a wait
   const Clock::duration renewal_;
   Clock::time_point renew_at_ = Clock::time_point::max();  // time of the next renewal
   uint64_t sequence_ = 0;                                  // of the latest message

@@ -23,17 +23,17 @@ absl::StatusOr<v1::QueryResult> result_of(v1::StreamQueriesResponse& response) {
 
 class QueryStream::Impl final : public Stream::Kind {
  public:
-  Impl(const Link& link, std::shared_ptr<Authorization> authorization, std::string scene,
-       const QueryStreamOptions& options)
-      : stub_(v1::QueryService::NewStub(link.channel)),
+  Impl(std::shared_ptr<Router> router, std::string scene, const QueryStreamOptions& options)
+      : lane_(options.lane),
         numbers_(options.writer, options.next_batch, lease_ms_of(options.lease)),
         stream_(*this, std::move(scene),
-                {link, options.max_in_flight, options.reconnect, options.patience, std::move(authorization),
+                {std::move(router), options.lane, options.max_in_flight, options.reconnect, options.patience,
                  renewal_of(options.lease)}) {}
 
   Stream& stream() { return stream_; }
 
-  void start_call(grpc::ClientContext* context, Stream::Reactor* reactor) override {
+  void start_call(const ServerLinks& server, grpc::ClientContext* context, Stream::Reactor* reactor) override {
+    stub_ = v1::QueryService::NewStub(server.link_of(lane_).channel);
     stub_->async()->StreamQueries(context, reactor);
   }
   void number(v1::StreamQueriesRequest& request) override {
@@ -45,6 +45,13 @@ class QueryStream::Impl final : public Stream::Kind {
     return request;
   }
   bool renews(const v1::StreamQueriesRequest& request) const override { return request.has_update(); }
+  v1::View* view_of(v1::StreamQueriesRequest& request) override {
+    return request.has_update() ? nullptr : request.mutable_batch()->mutable_view();
+  }
+  Revision revision_of(const StepResult& step) const override {
+    if (step.ack.revision() != 0 || !step.result.ok()) return {step.ack.epoch(), step.ack.revision()};
+    return {step.result->epoch(), step.result->revision()};
+  }
   // Returns the error of a batch without an update, and of a step that was refused as a whole.
   absl::StatusOr<StepResult> outcome_of(v1::StreamQueriesResponse& response) override {
     absl::StatusOr<v1::QueryResult> result = result_of(response);
@@ -68,14 +75,14 @@ class QueryStream::Impl final : public Stream::Kind {
   }
 
  private:
-  const std::unique_ptr<v1::QueryService::StubInterface> stub_;
-  BatchNumbers numbers_;  // guarded by the stream's lock
-  Stream stream_;         // declared last: its thread uses all members above
+  const Lane lane_;
+  std::unique_ptr<v1::QueryService::StubInterface> stub_;  // of the current call
+  BatchNumbers numbers_;                                   // guarded by the stream's lock
+  Stream stream_;                                          // declared last: its thread uses all members above
 };
 
-QueryStream::QueryStream(const Link& link, std::shared_ptr<Authorization> authorization, std::string scene,
-                         const QueryStreamOptions& options)
-    : impl_(std::make_unique<Impl>(link, std::move(authorization), std::move(scene), options)) {}
+QueryStream::QueryStream(std::shared_ptr<Router> router, std::string scene, const QueryStreamOptions& options)
+    : impl_(std::make_unique<Impl>(std::move(router), std::move(scene), options)) {}
 
 QueryStream::~QueryStream() = default;
 

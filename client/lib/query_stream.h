@@ -23,8 +23,7 @@
 
 namespace locus::client {
 
-class Authorization;
-struct Link;
+class Router;
 
 // Outcome of a step whose update was applied, except refused items.
 struct StepResult {
@@ -60,9 +59,8 @@ class QueryStream {
   using ResultCallback = std::function<void(absl::StatusOr<v1::QueryResult>)>;
   using StepCallback = std::function<void(absl::StatusOr<StepResult>)>;
 
-  // Opens a stream on `link`. Callers use Client::query_stream instead.
-  QueryStream(const Link& link, std::shared_ptr<Authorization> authorization, std::string scene,
-              const QueryStreamOptions& options);
+  // Opens a stream to the servers of `router`. Callers use Client::query_stream instead.
+  QueryStream(std::shared_ptr<Router> router, std::string scene, const QueryStreamOptions& options);
   // Cancels the stream; unanswered batches get CANCELLED.
   ~QueryStream();
   QueryStream(const QueryStream&) = delete;

@@ -129,8 +129,7 @@ void Routes::set_readers(absl::string_view scene, const v1::ScenePlacement* plac
   if (const auto old = readers_.find(scene); old != readers_.end()) readers = old->second;
   if (placement != nullptr) {
     readers.targets.clear();
-    for (const v1::SceneFollower& follower : placement->followers())
-      append_target(follower.address(), readers.targets);
+    for (const v1::SceneFollower& follower : placement->followers()) append_target(follower.address(), readers.targets);
     if (read_from != ReadFrom::kFollower || readers.targets.empty())
       append_target(placement->leader(), readers.targets);
   }

@@ -50,8 +50,8 @@ class Routes {
   void failed(const std::string& target);
   // Notes that the server at `target` does not lead the scene for the time `pause`, although it may be said to.
   void has_no_leader(absl::string_view scene, const std::string& target, absl::Duration pause);
-  // Notes the leader of a scene, as the server at `teller` named it in an error with REASON_ELSEWHERE. An answer with an
-  // older token is ignored, unless the known leader has failed or is the teller itself: then the scene may have been
+  // Notes the leader of a scene, as the server at `teller` named it in an error with REASON_ELSEWHERE. An answer with
+  // an older token is ignored, unless the known leader has failed or is the teller itself: then the scene may have been
   // deleted and created anew, with tokens from 1.
   void elsewhere(absl::string_view scene, const std::string& teller, const v1::Error& error);
   // Forgets who leads a scene, which a server does not know.

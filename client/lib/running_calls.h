@@ -3,6 +3,7 @@
 #ifndef LOCUS_CLIENT_LIB_RUNNING_CALLS_H_
 #define LOCUS_CLIENT_LIB_RUNNING_CALLS_H_
 
+#include <cstdint>
 #include <mutex>
 #include <set>
 
@@ -23,11 +24,18 @@ class RunningCalls {
   // Cancels every call; each returns CANCELLED.
   void cancel_all() {
     const std::lock_guard lock(mutex_);
+    ++cancelled_;
     for (grpc::ClientContext* const context : contexts_) context->TryCancel();
+  }
+  // Returns how often cancel_all() was called.
+  uint64_t cancelled() const {
+    const std::lock_guard lock(mutex_);
+    return cancelled_;
   }
 
  private:
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
+  uint64_t cancelled_ = 0;
   std::set<grpc::ClientContext*> contexts_;
 };
 

@@ -17,12 +17,11 @@ using UpdatePipeline = PipelinedStream<v1::StreamUpdatesRequest, v1::StreamUpdat
 
 class UpdateStream::Impl final : public UpdatePipeline::Kind {
  public:
-  Impl(const Link& link, std::shared_ptr<Authorization> authorization, std::string scene,
-       const UpdateStreamOptions& options)
-      : stub_(v1::UpdateService::NewStub(link.channel)),
+  Impl(std::shared_ptr<Router> router, std::string scene, const UpdateStreamOptions& options)
+      : lane_(options.lane),
         numbers_(options.writer, options.next_batch, lease_ms_of(options.lease)),
         stream_(*this, std::move(scene),
-                {link, options.max_in_flight, options.reconnect, options.patience, std::move(authorization),
+                {std::move(router), options.lane, options.max_in_flight, options.reconnect, options.patience,
                  renewal_of(options.lease)}) {}
 
   UpdatePipeline& stream() { return stream_; }
@@ -32,7 +31,8 @@ class UpdateStream::Impl final : public UpdatePipeline::Kind {
     return last_ack_;
   }
 
-  void start_call(grpc::ClientContext* context, UpdatePipeline::Reactor* reactor) override {
+  void start_call(const ServerLinks& server, grpc::ClientContext* context, UpdatePipeline::Reactor* reactor) override {
+    stub_ = v1::UpdateService::NewStub(server.link_of(lane_).channel);
     stub_->async()->StreamUpdates(context, reactor);
   }
 
@@ -46,6 +46,8 @@ class UpdateStream::Impl final : public UpdatePipeline::Kind {
     }
     return ack.status();
   }
+
+  Revision revision_of(const v1::UpdateAck& ack) const override { return {ack.epoch(), ack.revision()}; }
 
   absl::StatusOr<v1::UpdateAck> outcome_of(v1::StreamUpdatesResponse& response) override {
     if (response.has_ack()) return std::move(*response.mutable_ack());
@@ -73,16 +75,16 @@ class UpdateStream::Impl final : public UpdatePipeline::Kind {
   }
 
  private:
-  const std::unique_ptr<v1::UpdateService::StubInterface> stub_;
-  BatchNumbers numbers_;  // guarded by the stream's lock
+  const Lane lane_;
+  std::unique_ptr<v1::UpdateService::StubInterface> stub_;  // of the current call
+  BatchNumbers numbers_;                                    // guarded by the stream's lock
   mutable std::mutex ack_mutex_;
   std::optional<Revision> last_ack_;  // guarded by ack_mutex_
   UpdatePipeline stream_;             // declared last: its thread uses all members above
 };
 
-UpdateStream::UpdateStream(const Link& link, std::shared_ptr<Authorization> authorization, std::string scene,
-                           const UpdateStreamOptions& options)
-    : impl_(std::make_unique<Impl>(link, std::move(authorization), std::move(scene), options)) {}
+UpdateStream::UpdateStream(std::shared_ptr<Router> router, std::string scene, const UpdateStreamOptions& options)
+    : impl_(std::make_unique<Impl>(std::move(router), std::move(scene), options)) {}
 
 UpdateStream::~UpdateStream() = default;
 

@@ -39,8 +39,7 @@
 
 namespace locus::client {
 
-class Authorization;
-struct Link;
+class Router;
 
 struct UpdateStreamOptions {
   // Maximum number of unanswered batches, at least 1. send() blocks when this number is reached, which limits the
@@ -69,9 +68,8 @@ class UpdateStream {
  public:
   using AckCallback = std::function<void(absl::StatusOr<v1::UpdateAck>)>;
 
-  // Opens a stream on `link`. Callers use Client::update_stream instead.
-  UpdateStream(const Link& link, std::shared_ptr<Authorization> authorization, std::string scene,
-               const UpdateStreamOptions& options);
+  // Opens a stream to the servers of `router`. Callers use Client::update_stream instead.
+  UpdateStream(std::shared_ptr<Router> router, std::string scene, const UpdateStreamOptions& options);
   // Cancels the stream; unanswered batches get CANCELLED. To wait for their acks, call close() before the destructor.
   ~UpdateStream();
   UpdateStream(const UpdateStream&) = delete;
