@@ -33,8 +33,8 @@ absl::StatusOr<v1::MoveSceneResponse> call_with_leader(const client::Client& cli
   while (true) {
     const absl::Status checked =
         memory == MemoryScenes::kMove ? absl::OkStatus() : check_not_in_memory(client, request.scene());
-    absl::StatusOr<v1::MoveSceneResponse> moved = checked;
-    if (checked.ok()) moved = client.move_scene(request);
+    absl::StatusOr<v1::MoveSceneResponse> moved =
+        checked.ok() ? client.move_scene(request) : absl::StatusOr<v1::MoveSceneResponse>(checked);
     if (++calls >= ClusterConnections::kMaxCalls || reason_of(moved.status()) != v1::REASON_NO_LEADER) return moved;
     absl::SleepFor(std::max(kMinWait, client::retry_after(moved.status())));
   }

@@ -22,7 +22,7 @@ struct LedScene {
   bool in_memory = false;  // durability memory: a new leader begins with an empty scene
 };
 
-// Whether to move scenes of durability memory, which lose their objects then.
+// Choice for scenes of durability memory, which lose their objects when they move.
 enum class MemoryScenes { kStay, kMove };
 
 // Returns the description of the server's cluster. Returns FAILED_PRECONDITION if the server belongs to no cluster.
