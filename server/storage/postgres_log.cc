@@ -21,6 +21,10 @@ constexpr auto kBackoff = std::chrono::milliseconds(50);  // pause between two a
 // A parameter of PostgreSQL is at most 1 GiB long, and the engine needs several times the memory of a statement.
 constexpr uint64_t kMaxAppendBytes = uint64_t{256} << 20;
 
+// Longest wait for the lock of one scene's row, which another daemon has while it takes the scene over, or for some
+// seconds if it hangs: the other scenes of the group must not wait for it.
+constexpr const char* kLimitLocks = "SELECT set_config('lock_timeout', '100ms', true)";
+
 constexpr const char* kAppendName = "append";
 SqlParameters append_parameters(const Append& append) {
   std::vector<uint64_t> writers, batches;
@@ -197,6 +201,7 @@ absl::StatusOr<uint64_t> PostgresLog::append(SceneKey key, absl::Span<const LogE
       scene.possibly_last = scene.last + entries.size();
       return append.failure;
     case Append::Outcome::kNotWritten:
+    case Append::Outcome::kBlocked:  // the queue returns no such append
       return append.failure;
   }
   return absl::InternalError("unreachable");
@@ -205,7 +210,11 @@ absl::StatusOr<uint64_t> PostgresLog::append(SceneKey key, absl::Span<const LogE
 void PostgresLog::commit_group(absl::Span<Append* const> group) const {
   uint64_t bytes = 0;
   for (const Append* const append : group) bytes += append->bytes;
-  const Deadline deadline = change_deadline(bytes);
+  Deadline deadline = change_deadline(bytes);
+  for (Append* const append : group) {
+    if (append->until == Deadline()) append->until = deadline;
+    deadline = std::min(deadline, append->until);  // earlier for an append that was blocked
+  }
   std::vector<Append*> left(group.begin(), group.end());
   while (true) {
     const absl::Status status = send_appends(left, deadline);
@@ -230,13 +239,21 @@ absl::Status PostgresLog::send_appends(absl::Span<Append* const> appends, Deadli
   std::vector<Append*> open;  // appends whose outcome must be found out
   {
     ASSIGN_OR_RETURN(const EnginePool::Lease lease, acquire(EnginePool::Use::kUrgent, deadline));
+    lease->add(kLimitLocks);
     for (const Append* const append : appends) lease->add_prepared(kAppendName, append_parameters(*append));
     uint64_t bytes = 0;
     for (const Append* const append : appends) bytes += append->bytes;
     const absl::Status status = run_checked(*lease, options_.replication, std::min(deadline, answer_deadline(bytes)));
+    if (const std::optional<size_t> blocked = lease->blocked_statement();
+        blocked && !lease->lost() && *blocked - 1 < appends.size()) {
+      Append& append = *appends[*blocked - 1];
+      if (std::chrono::steady_clock::now() + kBackoff >= append.until) return status;
+      append.outcome = Append::Outcome::kBlocked;
+      return absl::OkStatus();  // the others may be sent again at once
+    }
     if (!status.ok() && !lease->lost()) return status;
     for (size_t i = 0; i < appends.size(); ++i) {
-      if (status.ok() && lease->results()[i].changed() == appends[i]->entries.size()) {
+      if (status.ok() && lease->results()[i + 1].changed() == appends[i]->entries.size()) {
         appends[i]->outcome = Append::Outcome::kWritten;
       } else {
         appends[i]->outcome = Append::Outcome::kUnknown;

@@ -4,8 +4,10 @@
 #ifndef LOCUS_TESTS_SUPPORT_STORED_MODEL_H_
 #define LOCUS_TESTS_SUPPORT_STORED_MODEL_H_
 
+#include <algorithm>
 #include <cstdint>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -71,7 +73,16 @@ class StoredModel {
     uint64_t tried = 0;     // sequence number of the last record that was requested
     uint64_t snapshot = 0;  // sequence number of the last acknowledged snapshot
     uint64_t tried_snapshot = 0;
+    uint64_t attempts = 0;
+    // Attempts that the log may have stored, by the sequence number of the record: the last one that succeeded, and
+    // later ones that failed.
+    std::map<uint64_t, std::set<uint64_t>> tries;
   };
+  // Returns the bytes of a record, which name the attempt to append it, so that a refused attempt that was stored
+  // after all does not look like the later one.
+  static std::string attempt_bytes(const Scene& scene, uint64_t sequence, uint64_t attempt) {
+    return absl::StrCat("attempt ", attempt, ":", record_bytes(scene.key, sequence));
+  }
 
   void create(UpdateLog& log) {
     const std::string name = absl::StrCat("s", next_name_++);
@@ -124,12 +135,17 @@ class StoredModel {
     const uint64_t before = log.latest(keys_[name]).value_or(0);
     const uint64_t count = 1 + random.below(3);
     const bool local = !random.chance(0.2);
+    const uint64_t attempt = ++scene->attempts;
     std::vector<std::string> bytes;
-    for (uint64_t i = 1; i <= count; ++i) bytes.push_back(record_bytes(scene->key, before + i));
+    for (uint64_t i = 1; i <= count; ++i) bytes.push_back(attempt_bytes(*scene, before + i, attempt));
     std::vector<LogEntry> entries;
     for (uint64_t i = 1; i <= count; ++i) entries.push_back(entry_of(scene->epoch, before + i, bytes[i - 1]));
     scene->tried = std::max(scene->tried, before + count);
     const auto last = log.append(keys_[name], entries, local ? AckLevel::kLocal : AckLevel::kMemory);
+    for (uint64_t i = 1; i <= count; ++i) {
+      if (last.ok()) scene->tries[before + i].clear();
+      scene->tries[before + i].insert(attempt);
+    }
     if (!last.ok() || !local) return;
     scene->last = *last;
     acknowledged_ += count;
@@ -172,8 +188,12 @@ class StoredModel {
     uint64_t last = stored->snapshot_sequence;
     std::string difference;
     const absl::Status read = log.read(stored->key, last + 1, [&](const LogRecord& record) {
-      if (record.sequence != last + 1 || record.entry.bytes != record_bytes(scene.key, record.sequence))
-        difference = absl::StrCat("record ", record.sequence, " is another");
+      const auto tries = scene.tries.find(record.sequence);
+      const bool tried =
+          tries != scene.tries.end() && std::any_of(tries->second.begin(), tries->second.end(), [&](uint64_t attempt) {
+            return record.entry.bytes == attempt_bytes(scene, record.sequence, attempt);
+          });
+      if (record.sequence != last + 1 || !tried) difference = absl::StrCat("record ", record.sequence, " is another");
       last = record.sequence;
       return absl::OkStatus();
     });

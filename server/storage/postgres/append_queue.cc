@@ -26,7 +26,13 @@ void AppendQueue::run(Append& append) {
     LOCUS_DCHECK_GT(committing_, 0u);
     --committing_;
     for (Append* const each : group) {
-      each->done = true;
+      each->done = each->outcome != Append::Outcome::kBlocked;
+      if (!each->done) {
+        each->outcome = Append::Outcome::kNotWritten;
+        each->alone = true;
+        each->taken = false;
+        waiting_.push_back(each);
+      }
       each->changed.notify_one();
     }
     if (!waiting_.empty()) waiting_.front()->changed.notify_one();
@@ -38,11 +44,12 @@ std::vector<Append*> AppendQueue::take_group() {
   uint64_t bytes = 0;
   while (!waiting_.empty() && group.size() < kGroupAppends) {
     Append* const next = waiting_.front();
-    if (!group.empty() && bytes + next->bytes > kGroupBytes) break;
+    if (!group.empty() && (next->alone || bytes + next->bytes > kGroupBytes)) break;
     bytes += next->bytes;
     next->taken = true;
     group.push_back(next);
     waiting_.pop_front();
+    if (next->alone) break;
   }
   std::sort(group.begin(), group.end(), [](const Append* a, const Append* b) { return a->scene < b->scene; });
   LOCUS_DCHECK(std::adjacent_find(group.begin(), group.end(), [](const Append* a, const Append* b) {

@@ -1,12 +1,15 @@
 // Group commit of appends: appends that wait at the same time, of all scenes, share one transaction, because an engine
 // is used up by commits, not by bytes. One of the waiting threads commits for all of its group; there is no thread of
 // its own. (The method: D. DeWitt et al., "Implementation Techniques for Main Memory Database Systems", 1984.)
+// An append whose scene is locked in the engine is committed again alone, after those that wait, so that it delays no
+// other scene.
 //
 // Threads: any thread, but only one append of a scene at a time. Invariants: a group has at most one append of a scene,
 // ordered by scene, so that two groups lock rows in the same order; at most `committers` groups are committed at once.
 #ifndef LOCUS_SERVER_STORAGE_POSTGRES_APPEND_QUEUE_H_
 #define LOCUS_SERVER_STORAGE_POSTGRES_APPEND_QUEUE_H_
 
+#include <chrono>
 #include <cstdint>
 #include <deque>
 #include <functional>
@@ -28,16 +31,20 @@ struct Append {
   absl::Span<const uint64_t> chains;  // running checksum after each entry
   uint64_t bytes = 0;                 // total size of the entries
 
-  // Set by the function that commits. kUnknown: it could not find out whether the append was written.
-  enum class Outcome : uint8_t { kNotWritten, kWritten, kFenced, kUnknown };
+  // Set by the function that commits. kUnknown: it could not find out whether the append was written. kBlocked: it was
+  // not written because another transaction has locked the scene's row; it is to be committed again.
+  enum class Outcome : uint8_t { kNotWritten, kWritten, kFenced, kUnknown, kBlocked };
   Outcome outcome = Outcome::kNotWritten;
   absl::Status failure;  // reason of kNotWritten and kUnknown
-  bool sent = false;     // it was sent on a connection that was lost, and may still arrive there
+  // Time at which the commit function gives up; set by its first call for this append.
+  std::chrono::steady_clock::time_point until;
+  bool sent = false;  // it was sent on a connection that was lost, and may still arrive there
 
  private:
   friend class AppendQueue;
   ConditionVariable changed;  // notified when the append is done, or may be committed by its own thread
   bool taken = false;
+  bool alone = false;  // it was blocked
   bool done = false;
 };
 
@@ -54,7 +61,8 @@ inline constexpr const char* kAppendStatement =
 
 class AppendQueue {
  public:
-  // Function that commits the appends of one group and sets the outcome of each.
+  // Function that commits the appends of one group and sets the outcome of each. It is called again, with this append
+  // alone, for an append that it leaves kBlocked.
   using Commit = std::function<void(absl::Span<Append* const>)>;
 
   static constexpr uint64_t kGroupBytes = uint64_t{8} << 20;  // a larger append is a group of its own

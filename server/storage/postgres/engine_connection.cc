@@ -29,9 +29,11 @@ absl::string_view message_of(const char* message) {
   return absl::StripTrailingAsciiWhitespace(message == nullptr ? "" : message);
 }
 
-bool is_read_only(const PGresult* result) {
+// Codes of errors of PostgreSQL's documentation, appendix A.
+constexpr absl::string_view kReadOnly = "25006", kLockNotAvailable = "55P03";
+bool has_code(const PGresult* result, absl::string_view code) {
   const char* const state = PQresultErrorField(result, PG_DIAG_SQLSTATE);
-  return state != nullptr && absl::string_view(state) == "25006";
+  return state != nullptr && state == code;
 }
 
 }  // namespace
@@ -183,6 +185,7 @@ absl::Status EngineConnection::error_of(const PGresult* result) const {
 absl::Status EngineConnection::run(Deadline deadline) {
   const size_t statements = std::exchange(added_, 0);
   size_t open = std::exchange(ends_, 0) + 1;  // transactions whose end was not reported yet
+  blocked_.reset();
   RETURN_IF_ERROR(send(deadline));
   absl::Status failure;
   bool read_only = false;
@@ -205,7 +208,8 @@ absl::Status EngineConnection::run(Deadline deadline) {
       results.push_back(std::move(rows));
     } else if (status != PGRES_PIPELINE_ABORTED && failure.ok()) {
       failure = error_of(result);
-      read_only = is_read_only(result);
+      read_only = has_code(result, kReadOnly);
+      if (has_code(result, kLockNotAvailable)) blocked_ = results.size();
     }
   }
   if (PQstatus(connection_.get()) != CONNECTION_OK) return lose(PQerrorMessage(connection_.get()));

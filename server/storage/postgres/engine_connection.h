@@ -14,6 +14,7 @@
 #include <chrono>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -92,6 +93,9 @@ class EngineConnection {
 
   // Returns whether the outcome of the last run() is unknown; the connection is then no longer usable.
   bool lost() const { return lost_; }
+  // Returns the number of the statement at which the last run() failed because a lock was not free within the session's
+  // lock_timeout, or nullopt if it did not fail for this reason. Nothing was written then.
+  std::optional<size_t> blocked_statement() const { return blocked_; }
   // Makes the connection unusable, and the outcome of the last run() unknown.
   absl::Status lose(absl::string_view why);
 
@@ -125,6 +129,7 @@ class EngineConnection {
   absl::Status add_error_;  // error of the first statement that could not be added
   std::string warning_;     // warning that the wait for the standbys was cancelled during the current run()
   std::vector<EngineRows> results_;
+  std::optional<size_t> blocked_;
   bool lost_ = false;
   bool broken_ = false;
 };

@@ -195,6 +195,52 @@ TEST_F(PostgresLogFaultTest, AnAppendWhoseAnswerIsLostIsFoundOut) {
   });
 }
 
+// Another daemon may hang while it has the lock of a scene.
+TEST_F(PostgresLogFaultTest, ALockedSceneDelaysNoOtherScene) {
+  constexpr SceneKey kScenes = 24;
+  for (SceneKey scene = 1; scene <= kScenes; ++scene) create(absl::StrCat("scene", scene), scene);
+  std::atomic<bool> ended = false;
+  std::atomic<uint64_t> delayed = 0;
+  std::vector<std::thread> threads;
+  for (SceneKey scene = 1; scene <= kScenes; ++scene)
+    threads.emplace_back([&, scene] {
+      while (!ended) {
+        const auto begin = std::chrono::steady_clock::now();
+        EXPECT_EQ(append_records(*log_, scene, 7, 1), absl::OkStatus());
+        if (scene != 5 && std::chrono::steady_clock::now() - begin > std::chrono::seconds(1)) ++delayed;
+        if (scene == 5) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+      }
+    });
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  EXPECT_EQ(
+      engine_->query("BEGIN; SELECT FROM locus.scene_log WHERE scene = 5 FOR UPDATE; SELECT pg_sleep(2.5); COMMIT"),
+      "");
+  EXPECT_EQ(delayed, 0u);
+  ended = true;
+  for (std::thread& thread : threads) thread.join();
+  uint64_t last = 0;
+  for (SceneKey scene = 1; scene <= kScenes; ++scene) EXPECT_EQ(record_difference(*log_, scene, 1, last), "");
+}
+
+// A scene that stays locked is refused in time, and the record is not stored.
+TEST_F(PostgresLogFaultTest, ASceneThatStaysLockedIsRefusedInTime) {
+  const SceneKey scene = create("a", 1);
+  log_ = nullptr;
+  PostgresOptions options = engine_->options();
+  options.append_wait = std::chrono::milliseconds(700);
+  log_ = open_and_lead(options);
+  std::thread locker([&] {
+    engine_->query("BEGIN; SELECT FROM locus.scene_log WHERE scene = 1 FOR UPDATE; SELECT pg_sleep(3); COMMIT");
+  });
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  const auto begin = std::chrono::steady_clock::now();
+  EXPECT_EQ(append_records(*log_, scene, 7, 1).code(), absl::StatusCode::kUnavailable);
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(2));
+  locker.join();
+  ASSERT_EQ(append_records(*log_, scene, 7, 1), absl::OkStatus());
+  expect_records(scene, 1, 1);
+}
+
 TEST_F(PostgresLogFaultTest, AKilledServerLosesNothingAndAppendsContinue) {
   expect_exact_while(*log_, [this] {
     for (int i = 0; i < 3; ++i) {

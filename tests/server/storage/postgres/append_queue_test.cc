@@ -23,11 +23,22 @@ class HeldAppends {
             append->outcome = Append::Outcome::kWritten;
           }
           MutexLock lock(mutex_);
+          for (Append* const append : group) {
+            if (append->scene != blocked_ || blocked_times_ == 0) continue;
+            --blocked_times_;
+            append->outcome = Append::Outcome::kBlocked;
+          }
           groups_.push_back(scenes);
           while (held_) changed_.wait(mutex_);
         }) {}
   ~HeldAppends() { release(); }
 
+  // Lets the next commits of a scene fail because the scene is locked.
+  void block(SceneKey scene, int times) {
+    MutexLock lock(mutex_);
+    blocked_ = scene;
+    blocked_times_ = times;
+  }
   void start(SceneKey scene, uint64_t bytes) {
     threads_.emplace_back([this, scene, bytes] {
       Append append;
@@ -64,6 +75,8 @@ class HeldAppends {
   Mutex mutex_;
   ConditionVariable changed_;
   bool held_ = true;
+  SceneKey blocked_ = 0;
+  int blocked_times_ = 0;
   std::vector<std::vector<SceneKey>> groups_;
   std::atomic<size_t> written_ = 0;
   AppendQueue queue_;
@@ -80,6 +93,17 @@ TEST(AppendQueueTest, AppendsThatWaitShareOneGroupInOrderOfScene) {
   let_wait();
   EXPECT_EQ(appends.release(), (std::vector<std::vector<SceneKey>>{{50}, {1, 3, 7, 9}}));
   EXPECT_EQ(appends.written(), 5u);
+}
+
+TEST(AppendQueueTest, ABlockedAppendIsCommittedAgainAloneAndAfterTheOthers) {
+  HeldAppends appends(1);
+  appends.block(3, 2);
+  appends.start(50, 10);
+  appends.wait_for_groups(1);
+  for (const SceneKey scene : {7, 3}) appends.start(scene, 10);
+  let_wait();
+  EXPECT_EQ(appends.release(), (std::vector<std::vector<SceneKey>>{{50}, {3, 7}, {3}, {3}}));
+  EXPECT_EQ(appends.written(), 3u);
 }
 
 TEST(AppendQueueTest, AGroupHasAtMostEightMebibytes) {
