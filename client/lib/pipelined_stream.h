@@ -10,9 +10,8 @@
 // With Options::renewal, the stream sends a request of its own (Kind::renewal()) when no request that renews the lease
 // was sent for that long. Renewals begin with the first such request and end when the stream is closed.
 //
-// In a cluster, each call goes to the server that leads the scene or, for a stream that sends queries only, to a reader
-// of it. A request that a server refuses because another one leads the scene is not answered: the stream opens a call
-// to that server and sends all unanswered requests again.
+// In a cluster, a request that a server refuses because another one leads the scene is not answered: the stream opens a
+// call to that server and sends all unanswered requests again.
 //
 // Threads: each stream owns one thread, the supervisor, which starts one call after another and waits for the end of
 // each call. Messages are read and written on gRPC's callback threads. send(), flush() and close() may be called from
@@ -128,7 +127,7 @@ class PipelinedStream {
         scene_(std::move(scene)),
         max_in_flight_(static_cast<size_t>(std::max(1, options.max_in_flight))),
         patience_(absl::ToChronoNanoseconds(options.patience)),
-        backoff_(policy_of(options)),
+        backoff_(options.router->reconnection(options.reconnect)),
         router_(options.router),
         lane_(options.lane),
         server_(router_->first()),
@@ -205,13 +204,6 @@ class PipelinedStream {
   static constexpr std::chrono::hours kLongestWait{1};
   // Maximum number of servers of a cluster that are tried in a row without a wait.
   static constexpr int kMaxHops = 8;
-
-  // Returns the policy of reconnection: in a cluster, one that outlasts a takeover.
-  static RetryPolicy policy_of(const Options& options) {
-    const RetryPolicy& cluster = options.router->options().retry;
-    const bool longer = options.router->routes() != nullptr && cluster.max_attempts > options.reconnect.max_attempts;
-    return longer ? cluster : options.reconnect;
-  }
 
   // One gRPC call. A hold (AddHold) prevents gRPC from finishing the call while other threads may still start writes.
   // OnReadDone() removes the hold when a read fails, which means that the call has ended. The stream's lock guards all
@@ -350,12 +342,6 @@ class PipelinedStream {
            std::is_partitioned(items_.begin(), items_.end(), [](const Item& item) { return item.written; });
   }
 
-  // Handles the answer to a message of `item.held`. Precondition: the caller holds the lock.
-  void receive_held(Item& item, Response& response) {
-    last_response_ = Clock::now();
-    item.refusal.Update(kind_.held(response));
-  }
-
   // Completes the request that `response` answers. Ignores a response whose sequence number matches no item: its
   // request was renumbered in the meantime and is sent again.
   void receive(Response& response) {
@@ -367,7 +353,10 @@ class PipelinedStream {
       return answers(candidate.request) || std::any_of(candidate.held.begin(), candidate.held.end(), answers);
     });
     if (item == items_.end()) return;
-    if (!answers(item->request)) return receive_held(*item, response);
+    if (!answers(item->request)) {  // an answer to a message of `item->held`
+      last_response_ = Clock::now();
+      return item->refusal.Update(kind_.held(response));
+    }
     const size_t position = static_cast<size_t>(item - items_.begin());
     if (!moved_.ok()) return;
     last_response_ = Clock::now();
@@ -411,11 +400,9 @@ class PipelinedStream {
 
   // Sends the query at `position` again, on the same call.
   void ask_again(size_t position) {
-    Item again = std::move(items_[position]);
-    items_.erase(items_.begin() + static_cast<std::ptrdiff_t>(position));
-    again.written = false;
-    const auto unwritten = std::find_if(items_.begin(), items_.end(), [](const Item& item) { return !item.written; });
-    items_.insert(unwritten, std::move(again));
+    const auto item = items_.begin() + static_cast<std::ptrdiff_t>(position);
+    item->written = false;
+    std::rotate(item, item + 1, std::find_if(item + 1, items_.end(), [](const Item& other) { return !other.written; }));
     pump();
   }
 
@@ -498,12 +485,10 @@ class PipelinedStream {
     if (router_->routes() == nullptr) return absl::OkStatus();
     const std::optional<Reading> reading = needs_leader_ ? std::nullopt : router_->reading(scene_, {});
     lock.unlock();
-    absl::StatusOr<std::shared_ptr<const ServerLinks>> server =
-        router_->server_for(scene_, reading ? &*reading : nullptr);
+    auto server = router_->server_for(scene_, reading ? &*reading : nullptr);
     lock.lock();
-    RETURN_IF_ERROR(server.status());
-    server_ = *std::move(server);
-    return absl::OkStatus();
+    if (server.ok()) server_ = *std::move(server);
+    return server.status();
   }
 
   // Waits for the end of the current call and returns true. If no response arrives for `patience_` while requests are
@@ -557,8 +542,8 @@ class PipelinedStream {
   // Returns the error of an unanswered item. The server whose refusal ended the stream of a cluster may not be the one
   // to which an update was sent before.
   absl::Status end_of(const Item& item) const {
-    const bool unknown = router_->routes() != nullptr && !item.reading && item.began && moves_to_other_server(*ended_);
-    return unknown && refused_by_server(*ended_) ? outcome_unknown(*ended_) : *ended_;
+    const bool refused = router_->routes() != nullptr && moves_to_other_server(*ended_) && refused_by_server(*ended_);
+    return refused && !item.reading && item.began ? outcome_unknown(*ended_) : *ended_;
   }
 
   absl::Status why_ended() const {
@@ -576,7 +561,7 @@ class PipelinedStream {
   Backoff backoff_;
   const std::shared_ptr<Router> router_;
   const Lane lane_;
-  std::shared_ptr<const ServerLinks> server_;  // of the current call; used by the supervisor and the call
+  std::shared_ptr<const ServerLinks> server_;  // of the current call
   absl::Status moved_;                         // error that moves the stream to another server
   bool needs_leader_ = false;                  // whether updates or queries for the leader were sent
   int hops_ = 0;                               // calls of other servers in a row without a wait

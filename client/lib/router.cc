@@ -118,6 +118,10 @@ Router::Router(std::vector<std::shared_ptr<const ServerLinks>> given, Open open,
 
 std::string Router::address() const { return absl::StrJoin(targets_of(given_), ","); }
 
+RetryPolicy Router::reconnection(const RetryPolicy& asked) const {
+  return routes_ != nullptr && options_.retry.max_attempts > asked.max_attempts ? options_.retry : asked;
+}
+
 std::optional<Reading> Router::reading(absl::string_view scene, const v1::View& view) {
   if (routes_ == nullptr) return std::nullopt;
   return std::optional<Reading>(std::in_place, *routes_, scene, view, options_.read_from);

@@ -110,6 +110,8 @@ class Router {
   Routes* routes() { return routes_.get(); }
   const ClusterOptions& options() const { return options_; }
   RunningCalls& running() { return running_; }
+  // Returns the policy of reconnection of a stream: in a cluster, one that outlasts a takeover.
+  RetryPolicy reconnection(const RetryPolicy& asked) const;
   // Returns the choice for a query; nothing for one server.
   std::optional<Reading> reading(absl::string_view scene, const v1::View& view);
 

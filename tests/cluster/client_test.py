@@ -86,11 +86,17 @@ class TakeoverTest(unittest.TestCase):
         return acks
 
     def assertAppliedOnce(self, acks):
-        """Checks that each batch was applied, once, in the order sent: the revisions are dense, and so are the objects."""
-        self.assertEqual([ack.revision for ack in acks], list(range(acks[0].revision, acks[0].revision + AFTER)))
+        """Checks that each batch was applied, once, in the order sent: the revisions are dense, and so are the objects. The
+        second ack of a batch may have a later revision, if the server does not store the first ack any more.
+        """
+        first = acks[0].revision
+        for index, ack in enumerate(acks):
+            self.assertGreaterEqual(ack.revision, first + index)
+            if not ack.duplicate:
+                self.assertEqual(ack.revision, first + index)
         self.assertEqual({ack.epoch for ack in acks}, {acks[0].epoch})
         result = self.client.query(self.scene, QueryBatch().lookup(list(range(1, AFTER + 1))))
-        self.assertEqual((result.epoch, result.revision), (acks[-1].epoch, acks[-1].revision))
+        self.assertEqual((result.epoch, result.revision), (acks[-1].epoch, first + AFTER - 1))
         self.assertEqual(listed(result.blocks[0].ids), list(range(1, AFTER + 1)))
 
     def test_killing_the_leader_loses_no_batch_and_applies_none_twice(self):
