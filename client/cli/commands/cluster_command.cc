@@ -82,7 +82,7 @@ absl::Status move_leadership(const ClusterMoveOptions& options, Context& context
                    connections.move(options.scene, options.address, memory_scenes(options.with_memory)));
   Report report;
   report.head = {{"scene", options.scene}, {"leader", moved.leader()}, {"token", moved.token()}};
-  context.acknowledge(report, absl::StrCat("moved ", options.scene, " to ", moved.leader()));
+  context.acknowledge(report, absl::StrCat(moved.leader(), " leads ", options.scene));
   return absl::OkStatus();
 }
 

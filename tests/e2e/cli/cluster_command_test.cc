@@ -128,7 +128,9 @@ TEST_F(ClusterCommandTest, AMoveFindsTheLeaderAndScenesShowTheirNewOne) {
   EXPECT_EQ(listed["leader"], address(next));
   EXPECT_EQ(listed["objects"], nullptr) << "only its leader knows its objects";
 
-  EXPECT_THAT(run_at(third, {"cluster", "move", "scene0"}).out, HasSubstr("moved scene0 to 127.0.0.1:"));
+  const Json again = json_at(third, {"cluster", "move", "scene0", address(next)});
+  EXPECT_EQ(again, moved) << "it leads the scene already";
+  EXPECT_THAT(run_at(third, {"cluster", "move", "scene0"}).out, HasSubstr(" leads scene0\n"));
   EXPECT_NE(leader_of("scene0"), next) << "the server chooses another one";
   EXPECT_EQ(run_at(0, {"cluster", "move", "scene0", "127.0.0.1:1"}).code, ExitCode::kNotFound);
   EXPECT_EQ(run_at(0, {"cluster", "move", "nowhere"}).code, ExitCode::kNotFound);

@@ -26,8 +26,8 @@ class ClusterConnections {
   // waiting.
   absl::StatusOr<client::Client*> at(const std::string& address);
 
-  // Moves a scene, beginning at the server of the context and following REASON_ELSEWHERE to the leader. Returns
-  // FAILED_PRECONDITION for a scene of durability memory if `memory` is kStay.
+  // Moves a scene, beginning at the server of the context and following REASON_ELSEWHERE to the leader. Does nothing if
+  // `to` leads it already. Returns FAILED_PRECONDITION for a scene of durability memory if `memory` is kStay.
   absl::StatusOr<v1::MoveSceneResponse> move(const std::string& scene, const std::string& to, MemoryScenes memory);
   // Moves a scene that the member `from` leads. Returns an error with REASON_ELSEWHERE if another one leads it.
   absl::StatusOr<v1::MoveSceneResponse> move_from(const std::string& from, const std::string& scene,
