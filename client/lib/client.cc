@@ -207,11 +207,6 @@ absl::StatusOr<BackupSize> Client::backup(BackupSink& sink) const {
   return size;
 }
 
-absl::StatusOr<v1::MoveSceneResponse> Client::move_scene(const v1::MoveSceneRequest& request) const {
-  return call(*connection_->servers, connection_->once(request.scene()), request,
-              &v1::ServerService::StubInterface::MoveScene);
-}
-
 absl::StatusOr<v1::Scene> Client::create_scene(const v1::CreateSceneRequest& request) const {
   CallPlan plan = connection_->once(request.name());
   plan.route = request.spec().static_from();
