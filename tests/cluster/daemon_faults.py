@@ -30,7 +30,8 @@ class DaemonFaults:
     def __init__(self, daemons, scenes, recorder=None, upgraded=""):
         self.daemons, self.scenes, self.recorder, self.upgraded = daemons, list(scenes), recorder, upgraded
         self.engine = daemons.engine if daemons else None
-        self.hits = 0  # faults of STORED that found a row
+        self.hits = 0     # faults of STORED that found a row
+        self.damaged = 0  # daemons that noticed one of those, and were started again
 
     def actions(self):
         """Returns the actions for fault_plan.run(), by the name of the fault."""
@@ -176,7 +177,20 @@ class DaemonFaults:
             self.ask(f"UPDATE locus.{table} SET bytes = set_byte(bytes, {position}, get_byte(bytes, {position}) # 1) "
                      f"WHERE {condition}", *key)
         act()
-        return act
+        return self.restored(act)
+
+    def restored(self, restore):
+        """Returns a function that restores a row, and then starts the daemons again that took over a scene while it was damaged,
+        as an operator does: they serve it no more.
+        """
+        def end():
+            restore()
+            for daemon in self.daemons.running():
+                if any(self.daemons.is_damaged(daemon, scene) for scene in self.scenes):
+                    self.damaged += 1
+                    self.daemons.drain(daemon)
+                    self.daemons.start(daemon)
+        return end
 
     def delete_record(self, fault):
         columns = ("epoch", "writer", "batch", "chain", "bytes")
@@ -187,7 +201,8 @@ class DaemonFaults:
         self.ask(f"DELETE FROM locus.{table} WHERE {condition}", *key)
         names_of_columns = (*STORED_ROWS[fault.name][1], *columns)
         marks = ", ".join(["%s"] * len(names_of_columns))
-        return lambda: self.ask(f"INSERT INTO locus.{table} ({', '.join(names_of_columns)}) VALUES ({marks})", *key, *values)
+        return self.restored(lambda: self.ask(
+            f"INSERT INTO locus.{table} ({', '.join(names_of_columns)}) VALUES ({marks})", *key, *values))
 
     # The end.
 

@@ -222,6 +222,10 @@ class Daemons:
         """Cuts all other daemons off from a daemon, but not its clients, nor it from them."""
         self.keeper.set([self.peers_link(daemon)], state)
 
+    def is_damaged(self, daemon, scene):
+        """Returns whether a daemon says that the stored data of a scene is damaged."""
+        return self.caller.call(daemon.name, "Scene", "GetScene", name=scene).reason == "REASON_DAMAGED"
+
     def placement(self, scene):
         """Returns the newest ScenePlacement that a running daemon tells, or None."""
         newest = None

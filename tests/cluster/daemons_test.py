@@ -39,6 +39,8 @@ MAX_FAULT_SECONDS = 12
 ACKS = 200  # between two faults of a test
 # A leader is killed, another one is frozen for longer than its lease, and the primary is lost.
 SHORT_PLAN = "1 kill-leader 3 {0}\n10 freeze-leader 10 {1}\n27 kill-primary 2 {2}\n"
+# A record of the first scene is damaged while another daemon takes the scene over.
+DAMAGE_PLAN = "2 kill-leader 1 0\n3.5 flip-record 10 20\n"
 SCENES = ["arena", "maze"]
 # Columns of the tables that are damaged, without their last one: bytes.
 COLUMNS = {"record": ("scene", "sequence", "epoch", "writer", "batch", "chain"),
@@ -249,7 +251,15 @@ class ClusterTest(unittest.TestCase):
     """
 
     def test_a_cluster_keeps_its_promises_through_faults(self):
-        plan, recorder = plan_of_this_run(), Recorder(SEED, memory_scenes={"brawl"})
+        self.run_plan(plan_of_this_run(), os.environ.get("LOCUS_CLUSTER_HISTORY"))
+
+    def test_a_damaged_record_is_noticed_at_takeover_and_nothing_of_it_is_served(self):
+        faults = self.run_plan(Plan.parse(DAMAGE_PLAN))
+        self.assertEqual((faults.hits, faults.damaged), (1, 1))
+
+    def run_plan(self, plan, file_name=None):
+        """Runs clients through a plan, and judges their history, which can be written to a file. Returns the DaemonFaults."""
+        recorder = Recorder(SEED, memory_scenes={"brawl"})
         say("\n" + str(plan))
         specs = {SCENES[0]: {"followers": 1}, SCENES[1]: {}, "brawl": MEMORY}
         with Engine(life_seconds=LIFE_SECONDS) as engine, Daemons(3, engine) as daemons:
@@ -264,11 +274,12 @@ class ClusterTest(unittest.TestCase):
                 workload.finish()
                 daemons.check_running()
                 say(f"{workload.summary()}; {longest_pauses(recorder.history, specs)}")
-        if os.environ.get("LOCUS_CLUSTER_HISTORY"):
-            with open(os.environ["LOCUS_CLUSTER_HISTORY"], "w", encoding="utf-8") as file:
+        if file_name:
+            with open(file_name, "w", encoding="utf-8") as file:
                 recorder.history.write(file)
         violations = check(recorder.history)
         self.assertFalse(violations, report(recorder.history, violations, origin=str(plan)))
+        return faults
 
     def test_acknowledged_records_that_the_engine_loses_are_found(self):
         recorder = Recorder(SEED)
