@@ -117,8 +117,8 @@ class Client {
   absl::StatusOr<v1::UpdateSceneResponse> update_scene(const v1::UpdateSceneRequest& request) const;
   absl::Status delete_scene(const v1::DeleteSceneRequest& request) const;
 
-  // Moves the leadership of a scene to another server of the cluster. Not retried. Of a client with one address, call it
-  // at the leader: any other server refuses with REASON_ELSEWHERE, and error_of() has the leader's address.
+  // Moves the leadership of a scene to another server of the cluster. Not retried. Of a client with one address, call
+  // it at the leader: any other server refuses with REASON_ELSEWHERE, and error_of() has the leader's address.
   absl::StatusOr<v1::MoveSceneResponse> move_scene(const v1::MoveSceneRequest& request) const;
 
   // Uploads a mesh in messages of at most 1 MiB. The first message has the mesh's SHA-256 and all parts of the mesh, so

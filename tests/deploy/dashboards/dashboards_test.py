@@ -39,7 +39,8 @@ def metrics_of_a_cluster():
     tests/e2e/cli/cluster_command_test.cc compares them with a cluster.
     """
     rows = [line.split("|") for line in read("README.md").split("\n") if line.startswith("| `")]
-    names = {name for row in rows if row[-2].strip().startswith("in a cluster: ") for name in re.findall(r"`(locus_\w+)`", row[1])}
+    names = {name for row in rows if row[-2].strip().startswith("in a cluster: ")
+             for name in re.findall(r"`(locus_\w+)`", row[1])}
     return names | {name + part for name in names if name.endswith("_seconds") for part in ("_bucket", "_sum", "_count")}
 
 
