@@ -208,7 +208,9 @@ void get_server(Host& host, const Caller& caller, v1::GetServerResponse& respons
   response.set_use_hidden(!shows_use);
   response.set_http_port(host.http_port);
   response.set_http_host(host.http_host);
-  if (host.cluster != nullptr) *response.mutable_cluster() = host.cluster->describe();
+  if (host.cluster == nullptr) return;
+  *response.mutable_cluster() = host.cluster->describe();
+  if (!shows_use) response.mutable_cluster()->clear_engine();
 }
 
 }  // namespace

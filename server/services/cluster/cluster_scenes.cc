@@ -82,7 +82,7 @@ void ClusterScenes::start() {
 }
 
 void ClusterScenes::end() {
-  ended_ = true;
+  if (ended_.exchange(true)) return;
   member_.stop();
   std::unique_ptr<ChangeQueue> readers;  // ends without the lock, which its jobs take
   {
