@@ -86,17 +86,25 @@ struct ThreadedDaemon {
             engine,
             [this](CallKind kind) {
               ++hanging;
-              while (hangs && kind != CallKind::kBeat) std::this_thread::sleep_for(milliseconds(1));
+              while (kind == CallKind::kBeat ? beats_hang : hangs) std::this_thread::sleep_for(milliseconds(1));
               --hanging;
               return away ? CallFate::kNever : CallFate::kAnswered;
             },
             [](const std::function<void()>&) {}, [](CallKind, CallFate) {}),
-        member(std::make_unique<ClusterMember>(
-            link, host, ClusterMember::Options{{"host", "", ""}, fast_timing(), &steady_now, seed})) {
+        member(std::make_unique<ClusterMember>(link, host,
+                                               ClusterMember::Options{{"host", "", ""},
+                                                                      fast_timing(),
+                                                                      [this] {
+                                                                        ++clock_calls;
+                                                                        return steady_now();
+                                                                      },
+                                                                      seed})) {
     member->start();
   }
-  std::atomic<bool> away{false};     // cut off from the engine
-  std::atomic<bool> hangs{false};    // calls but beats wait until this is false again
+  std::atomic<bool> away{false};  // cut off from the engine
+  std::atomic<bool> beats_hang{false};
+  std::atomic<bool> hangs{false};  // calls but beats wait until this is false again
+  std::atomic<uint64_t> clock_calls{0};
   std::atomic<uint64_t> hanging{0};  // calls that wait
   test::EngineLink link;
   ThreadedHost host;
@@ -203,6 +211,19 @@ TEST_F(ClusterMemberTest, MovesThatWaitEndWhenTheDaemonStops) {
   EXPECT_EQ(code, absl::StatusCode::kCancelled);
   EXPECT_EQ(daemon.member->move(1, 5, deadline).code(), absl::StatusCode::kCancelled) << "it has stopped";
   EXPECT_LT(std::chrono::steady_clock::now(), deadline);
+}
+
+// The silence of the neighbours, who beat no more, is over long ago, but does not count while the own beat hangs.
+TEST_F(ClusterMemberTest, AThreadSleepsWhileABeatHangs) {
+  ASSERT_TRUE(soon([&] { return engine_.living() == daemons_.size(); }));
+  std::this_thread::sleep_for(milliseconds(50));
+  for (const auto& daemon : daemons_) daemon->beats_hang = true;
+  std::this_thread::sleep_for(milliseconds(200));
+  const uint64_t before = daemons_[0]->clock_calls;
+  std::this_thread::sleep_for(milliseconds(500));
+  const uint64_t calls = daemons_[0]->clock_calls - before;
+  for (const auto& daemon : daemons_) daemon->beats_hang = false;
+  EXPECT_LT(calls, 600u) << "a step each 10 ms has a few calls";
 }
 
 // A host may fence a scene again at once, with the token that the engine still has.
