@@ -179,6 +179,19 @@ class TakeoverTest(unittest.TestCase):
             client.apply(self.scene, UpdateBatch())
         return refused.exception if refused.exception.reason == locus.Reason.ELSEWHERE else None
 
+    def test_servers_and_scenes_describe_the_cluster(self):
+        leader = self.leader()
+        with locus.connect([leader.address]) as client:
+            cluster, scene = client.server().cluster, client.scene(self.scene)
+        own = next(member for member in cluster.members if member.id == cluster.member)
+        self.assertIn(own.address, [member.address for member in self.members])
+        self.assertTrue(cluster.engine and cluster.engine_answers)
+        self.assertEqual(scene.durability, locus.Durability.REPLICATED)
+        self.assertEqual((scene.placement.role, scene.placement.followers), (SceneRole.LEADING, ()))
+        self.assertGreater(scene.placement.token, 0)
+        listed_scene = next(one for one in self.client.scenes() if one.name == self.scene)
+        self.assertEqual(listed_scene.placement.token, scene.placement.token)
+
     def test_one_address_is_enough_to_find_the_others(self):
         leader = self.leader()
         other = next(member for member in self.members if member is not leader)

@@ -23,7 +23,8 @@ _SEQUENCE, _RESULT, _ERROR, _ACK = (_METHOD.response.DESCRIPTOR.fields_by_name[n
 class QueryStream(PipelinedStream[Any]):
     """Stream returned by Client.query_stream(). Thread-safe. After a broken connection, unanswered batches are sent
     again on a new connection. This is safe, because queries change nothing, and the server applies the update of a step
-    only once. The stream ends in the same cases as an UpdateStream, and renews its lease like one.
+    only once. The stream ends in the same cases as an UpdateStream, and renews its lease like one. In
+    a cluster, a stream of queries goes to a server that `read_from` of connect() admits, and one with steps to the leader.
     """
 
     def __init__(self, connection: AnyConnection, scene: str, max_in_flight: int, retry: Retry, lease_ms: int) -> None:

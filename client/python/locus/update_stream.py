@@ -31,6 +31,9 @@ class UpdateStream(PipelinedStream[Ack]):
     often as `reconnect` allows. The future of every unanswered batch then raises the LocusError with which the stream
     ended; the outcome of these batches is unknown.
 
+    In a cluster, the stream goes to the server that leads the scene, and to the next leader if that server is lost or hands
+    the scene over; no batch is lost or applied twice.
+
     With `lease_ms`, the server removes the objects that the stream inserted when no batch of the stream has arrived for
     that long. The lease begins with the first batch. While the caller sends nothing, the stream renews the lease by empty
     batches, a third of the lease apart, so the objects stay as long as the stream is open, however silent the caller is.

@@ -20,6 +20,7 @@ class ClientTest(DaemonTest):
         self.assertEqual(server.version, self.command_line("version", "--server")["server_version"])
         self.assertIn("rays", server.features)
         self.assertFalse(server.insecure)
+        self.assertIsNone(server.cluster)
         self.assertGreater(server.limits["max_reply_bytes"].value, 4_000_000)
 
     def test_quotas_are_those_of_the_caller_and_its_connection(self):
@@ -50,6 +51,7 @@ class ClientTest(DaemonTest):
         hall = self.client.scene("hall")
         self.assertEqual((hall.epoch, hall.revision, hall.tick, hall.objects), (made.epoch, 1, 4, 1))
         self.assertEqual(hall.state, locus.SceneState.READY)
+        self.assertEqual((hall.placement, hall.durability), (None, locus.Durability.MEMORY))
         low, high = hall.bounds
         self.assertTrue(all(a <= b for a, b in zip(low, (0, 1, 2))) and all(a >= b for a, b in zip(high, (2, 3, 4))))
         self.assertEqual([scene.name for scene in self.client.scenes({"map": "hall"})], ["hall"])

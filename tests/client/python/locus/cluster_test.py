@@ -126,6 +126,11 @@ class CallsTest(ClusterTest):
         with self.assertRaisesRegex(locus.LocusError, "nothing answers at"):
             self.connect(timeout=0.5, wait_for_server=True)
 
+    def test_a_token_is_not_sent_unencrypted_to_a_server_that_another_one_names(self):
+        self.cluster["leader"] = "10.0.0.9:7575"
+        with self.assertRaisesRegex(locus.LocusError, "10.0.0.9:7575 .* does not connect there: without TLS"):
+            self.connect(token="secret").apply("arena", UpdateBatch())
+
     def test_a_closed_client_says_so(self):
         client = self.connect()
         client.close()
