@@ -1,5 +1,6 @@
 // `locus cluster`: members and engine of a cluster, and moves of its scenes.
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <memory>
 #include <string>
@@ -192,7 +193,8 @@ absl::Status rebalance_scenes(const RebalanceOptions& options, Context& context)
                        .keys = {"scene", "from", "to", "load", "outcome"},
                        .no_rows = "no moves: the loads are balanced, or no scene can be moved to balance them",
                        .width_rows = 1});
-  stream.begin({{"mean", plan.mean}, {"busiest", plan.busiest_before}, {"busiest_after", plan.busiest_after}});
+  stream.begin(
+      {{"mean", std::llround(plan.mean)}, {"busiest", plan.busiest_before}, {"busiest_after", plan.busiest_after}});
   uint64_t failed = 0;
   const auto add = [&](const PlannedMove& move, const std::string& outcome) {
     stream.add(
