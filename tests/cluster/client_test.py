@@ -29,7 +29,8 @@ class TakeoverTest(unittest.TestCase):
         self.members = [self.start(name) for name in ("a", "b", "c")]
         self.client = wait_until(lambda: locus.connect([member.address for member in self.members]))
         self.addCleanup(self.client.close)
-        wait_until(lambda: len(self.client.server().cluster.members) >= 3)
+        started = {member.address for member in self.members}
+        wait_until(lambda: started <= {member.address for member in self.client.server().cluster.members})
         self.scene = self._testMethodName[:60].replace("_", "-").rstrip("-")
         self.client.create_scene(self.scene)
 
@@ -148,7 +149,8 @@ class TakeoverTest(unittest.TestCase):
         other = next(member.address for member in self.members if member is not leader)
         with self.client.update_stream(self.scene) as stream:
             stream.send(UpdateBatch(tick=1)).result(WAIT_SECONDS)
-            self.assertEqual(self.client.move_scene(self.scene, other).leader, other)
+            moved = wait_until(lambda: self.client.move_scene(self.scene, other))  # once the leader knows the other member
+            self.assertEqual(moved.leader, other)
             self.assertEqual(stream.send(UpdateBatch(tick=2)).result(WAIT_SECONDS).tick, 2)
         self.assertEqual(self.leader().address, other)
         self.assertEqual(self.client.query(self.scene, QueryBatch()).tick, 2)
