@@ -67,6 +67,12 @@ class ClusterCommandTest : public ::testing::Test {
     ADD_FAILURE() << scene << " is led by nobody: " << leader;
     return 0;
   }
+  // Inserts an object at the leader, which may still begin to lead.
+  void insert_into_scene0(size_t leader) {
+    ASSERT_TRUE(becomes_true([&] {
+      return run_at(leader, {"insert", "scene0", "ball", "--id", "7", "--at", "0,0,0", "--radius", "1"}).err.empty();
+    }));
+  }
   void gather_at(size_t at, int count) {
     for (int i = 0; i < count; ++i) {
       const std::string scene = absl::StrCat("scene", i);
@@ -109,7 +115,7 @@ TEST_F(ClusterCommandTest, AMoveFindsTheLeaderAndScenesShowTheirNewOne) {
   create(1);
   const size_t leader = leader_of("scene0");
   const size_t next = (leader + 1) % 3, third = (leader + 2) % 3;
-  ASSERT_TRUE(run_at(leader, {"insert", "scene0", "ball", "--id", "7", "--at", "0,0,0", "--radius", "1"}).err.empty());
+  insert_into_scene0(leader);
   const Json moved = json_at(third, {"cluster", "move", "scene0", address(next)});
   EXPECT_EQ(moved["leader"], address(next));
   EXPECT_EQ(leader_of("scene0"), next);
@@ -247,9 +253,7 @@ double metric_of(const std::string& page, const std::string& name) {
 TEST_F(ClusterCommandTest, MetricsAndTopShowTheRolesTheMembersAndTheEngine) {
   create(1);
   const size_t leader = leader_of("scene0");
-  ASSERT_TRUE(becomes_true([&] {
-    return run_at(leader, {"insert", "scene0", "ball", "--id", "7", "--at", "0,0,0", "--radius", "1"}).err.empty();
-  }));
+  insert_into_scene0(leader);
   const std::string page = metrics_at(leader);
   EXPECT_EQ(metric_of(page, "locus_cluster_leading"), 1);
   EXPECT_EQ(metric_of(page, "locus_cluster_leaderships_total"), 1);
