@@ -47,8 +47,8 @@ struct ClusterMapOptions {
 };
 
 absl::Status engine_is_away(const v1::Cluster& cluster) {
-  return absl::FailedPreconditionError(
-      absl::StrCat("the engine ", cluster.engine(), " does not answer this member: scenes cannot be listed or moved"));
+  return absl::FailedPreconditionError(absl::StrCat("the engine", cluster.engine().empty() ? "" : " ", cluster.engine(),
+                                                    " does not answer this member: scenes cannot be listed or moved"));
 }
 
 MemoryScenes memory_scenes(bool with_memory) { return with_memory ? MemoryScenes::kMove : MemoryScenes::kStay; }

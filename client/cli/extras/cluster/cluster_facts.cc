@@ -69,7 +69,7 @@ Report report_of(const v1::Cluster& cluster, const std::vector<LedScene>* scenes
                            {"draining", member.draining()},
                            {"scenes", scenes == nullptr ? Json() : Json(counts[member.address()])},
                            {"this", member.id() == cluster.member()}});
-  report.head = {{"engine", cluster.engine()},
+  report.head = {{"engine", cluster.engine().empty() ? Json() : Json(cluster.engine())},
                  {"engine_answers", cluster.engine_answers()},
                  {"scenes", scenes == nullptr ? Json() : Json(scenes->size())},
                  {"no_leader", scenes == nullptr ? Json() : Json(counts[""])}};

@@ -40,7 +40,8 @@ std::map<std::string, uint64_t> count_by_leader(const std::vector<LedScene>& sce
 // Returns the lines `SCENE ADDRESS` of a map for a proxy, in the order of `scenes`, without scenes that have no leader.
 std::string map_lines(const std::vector<LedScene>& scenes);
 
-// Returns the report of `locus cluster status`. `scenes` is null if they are not known.
+// Returns the report of `locus cluster status`. `scenes` is null if they are not known. A server tells the engine's
+// hosts only to callers who may see its metrics.
 Report report_of(const v1::Cluster& cluster, const std::vector<LedScene>* scenes);
 
 // Returns the role of the server that answered, such as "leading".

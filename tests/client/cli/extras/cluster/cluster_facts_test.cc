@@ -40,9 +40,11 @@ TEST(ClusterFactsTest, TheReportHasTheMembersTheEngineAndWhoLeadsHowManyScenes) 
 TEST(ClusterFactsTest, WithoutTheEngineTheNumbersOfScenesAreNotKnown) {
   v1::Cluster cluster = two_members();
   cluster.set_engine_answers(false);
+  cluster.set_engine("");
   const Report report = report_of(cluster, nullptr);
   EXPECT_EQ(report.rows[0]["scenes"], nullptr);
-  EXPECT_EQ(report.head.dump(), R"({"engine":"db1,db2","engine_answers":false,"scenes":null,"no_leader":null})");
+  EXPECT_EQ(report.head.dump(), R"({"engine":null,"engine_answers":false,"scenes":null,"no_leader":null})")
+      << "some callers may not see the engine's hosts";
 }
 
 TEST(ClusterFactsTest, TheMapHasALineForEachSceneThatHasALeader) {
