@@ -243,6 +243,32 @@ TEST_F(ServerConfigTest, TheHttpPortFollowsTheSameRuleAndCanBeTurnedOff) {
   EXPECT_EQ(read({"--config", file_}).config->http_listen, "");
 }
 
+TEST_F(ServerConfigTest, AMemberOfAClusterNeedsAnAddressThatOthersReachAndNoDirectory) {
+  const std::string engine = "postgresql://a,b,c/locus";
+  EXPECT_EQ(read({}).config->cluster, "");
+  const ServerConfig member = *read({"--cluster", engine, "--zone", "z"}).config;
+  EXPECT_EQ(member.cluster, engine);
+  EXPECT_EQ(member.zone, "z");
+  EXPECT_EQ(member.engine_replication, ReplicatedBy::kStandbys);
+  EXPECT_EQ(read({"--cluster", engine, "--engine-replication", "storage"}).config->engine_replication,
+            ReplicatedBy::kStorage);
+  EXPECT_THAT(read({"--cluster", engine, "--engine-replication", "hope"}).text, HasSubstr("--engine-replication"));
+  EXPECT_THAT(read({"--cluster", engine, "--data-dir", "d"}).text, HasSubstr("exclude each other"));
+  EXPECT_THAT(read({"--cluster", engine, "--listen", "unix:/tmp/a.sock"}).text, HasSubstr("needs a TCP address"));
+  EXPECT_THAT(read({"--cluster", engine, "--listen", "0.0.0.0:1", "--insecure"}).text, HasSubstr("--advertise"));
+  EXPECT_EQ(
+      read({"--cluster", engine, "--listen", "0.0.0.0:1", "--insecure", "--advertise", "a:7575"}).config->advertise,
+      "a:7575");
+  for (const char* const wrong : {"a", "a:0", "unix:/tmp/a.sock"})
+    EXPECT_THAT(read({"--cluster", engine, "--advertise", wrong}).text, HasSubstr("--advertise")) << wrong;
+  EXPECT_THAT(read({"--advertise", "a:7575"}).text, HasSubstr("give --cluster too"));
+  environment_ = {{"LOCUS_CLUSTER", engine}};
+  EXPECT_EQ(read({}).config->cluster, engine) << "commas do not divide it";
+  environment_ = {};
+  write_file("cluster = \"" + engine + "\"\n");
+  EXPECT_EQ(read({"--config", file_}).config->cluster, engine);
+}
+
 TEST_F(ServerConfigTest, ThreadsAndMemoryFollowTheMachineUnlessGiven) {
   const Machine machine = read_machine();
   const ServerConfig followed = *read({}).config;
