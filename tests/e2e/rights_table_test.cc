@@ -87,6 +87,7 @@ constexpr std::array kRows = std::to_array<RpcRow>({
     {"/locus.v1.ServerService/GetServer", kKnown},
     {"/locus.v1.ServerService/GetQuotas", kAdmins},
     {"/locus.v1.ServerService/Backup", kBackups},
+    {"/locus.v1.ServerService/MoveScene", kDeletes},  // served, although the answer is that there is no cluster
     {"/grpc.health.v1.Health/Check", kAll},
     {"/grpc.health.v1.Health/Watch", kAll},
     {"/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo", kReflects},
