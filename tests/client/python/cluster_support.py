@@ -27,8 +27,8 @@ class Member:
 
     def __init__(self, postgres, name):
         self.folder = tempfile.TemporaryDirectory()
-        self.port = engine.free_port()
-        self.address = f"127.0.0.1:{self.port}"
+        self.holder = engine.hold_port()
+        self.address = f"127.0.0.1:{self.holder.getsockname()[1]}"
         self.log = open(os.path.join(self.folder.name, "log"), "wb")
         self.process = subprocess.Popen(
             [os.path.join(BIN, "locusd"), "--listen", self.address, "--http-listen", "", "--zone", name,
@@ -50,6 +50,7 @@ class Member:
             self.kill()
         self.log.close()
         self.folder.cleanup()
+        self.holder.close()
 
 
 def wait_until(condition, seconds=START_SECONDS):
