@@ -1,15 +1,18 @@
 """Measures a cluster of three daemons on a primary and two standbys: how long writes stop when a leader is killed or drained,
-and how long it takes until a thousand scenes are led again. A tool for people, not a test.
+how long it takes until a thousand scenes are led again, and what replicated acks cost. A tool for people, not a test.
 
-    python3 -B measure.py [--scenes 1000] [--rounds 3] [takeover] [drain] [scenes]
+    python3 -B measure.py [--scenes 1000] [--rounds 3] [takeover] [drain] [scenes] [acks]
 """
 import argparse
+import json
+import os
 import statistics
+import subprocess
 import sys
 import threading
 import time
 
-from calls import Answer, Caller, double_column, id_column, request_of
+from calls import BIN, Answer, Caller, double_column, id_column, request_of
 from daemons import Daemons
 from engine import Engine
 
@@ -134,9 +137,28 @@ def scenes(daemons, count):
           f"{time.monotonic() - begin:.1f} s; bar 15 s; the list takes {seconds:.2f} s; bar 1 s", flush=True)
 
 
+def moves_per_second(address, streams=8, seconds=4):
+    """Returns the rate of acknowledged moves of `streams` scenes, each by one stream of batches of 256."""
+    command = [os.path.join(BIN, "locus"), "--address", address, "-o", "json", "bench", "--connections", "1", "--kinds", "moves",
+               "--batch", "256", "--seconds", str(seconds)]
+    processes = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(streams)]
+    reports = [json.loads(process.communicate()[0]) for process in processes]
+    return sum(kind["rate_per_s"] for report in reports for kind in report["kinds"])
+
+
+def acks(rounds):
+    """Compares acks of a cluster of one daemon with those of a daemon that has a data directory, in turns."""
+    with Engine() as engine, Daemons(1, engine) as cluster, Daemons(1) as alone:
+        time.sleep(2)
+        pairs = [(moves_per_second(cluster.daemons[0].address), moves_per_second(alone.daemons[0].address))
+                 for _ in range(rounds)]
+    replicated, local = (statistics.median(rates) for rates in zip(*pairs))
+    print(f"acks: {replicated:.0f} moves/s REPLICATED, {local:.0f} LOCAL: {replicated / local:.2f}x; bar 0.4", flush=True)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("rows", nargs="*", default=["takeover", "drain", "scenes"])
+    parser.add_argument("rows", nargs="*", default=["takeover", "drain", "scenes", "acks"])
     parser.add_argument("--scenes", type=int, default=1000)
     parser.add_argument("--rounds", type=int, default=3)
     options = parser.parse_args()
@@ -147,6 +169,8 @@ def main():
             measure(options.rounds, "drain", "1 s", daemons, daemons.drain)
         if "scenes" in options.rows:
             scenes(daemons, options.scenes)
+    if "acks" in options.rows:
+        acks(options.rounds)
 
 
 if __name__ == "__main__":
