@@ -213,7 +213,7 @@ absl::Status ClusterScenes::remove(const std::string& name) {
     host_.registry.drop_scene(led.scene);
   }
   directory_.forget(name);
-  member_.fenced(key, led.lease->token());
+  end_deleted(key, *led.lease);
   return absl::OkStatus();
 }
 
@@ -228,7 +228,16 @@ void ClusterScenes::deleted(const Scene& scene) {
           {{"scene", scene.name()}, {"why", std::string(removed.message())}});
   }
   directory_.forget(scene.name());
-  member_.fenced(key, lease->token());
+  end_deleted(key, *lease);
+}
+
+void ClusterScenes::end_deleted(SceneKey key, const SceneLease& lease) {
+  {
+    const MutexLock lock(mutex_);
+    const auto found = led_.find(key);
+    if (found != led_.end() && found->second.lease.get() == &lease) found->second.deleted = true;
+  }
+  member_.fenced(key, lease.token());
 }
 
 absl::Status ClusterScenes::store_settings(const Scene& scene) {
@@ -284,7 +293,7 @@ uint64_t ClusterScenes::load() {
 void ClusterScenes::start_leading(const LedScene& scene) {
   {
     const MutexLock lock(mutex_);
-    led_[scene.row.key] = Led{scene.lease, "", nullptr};
+    led_[scene.row.key] = Led{scene.lease, "", nullptr, false};
     leaving_.erase(scene.row.key);
   }
   ++begun_;
@@ -307,7 +316,7 @@ void ClusterScenes::stop_leading(SceneKey key, Token token, StopReason reason) {
     if (!stopped.name.empty() && stopped.scene == nullptr) host_.registry.drop_damaged_scene(stopped.name, key);
     if (!stopped.name.empty() && reason == StopReason::kHandedOver) leaving_[key] = stopped.name;
   }
-  if (reason == StopReason::kFenced) ++fenced_;
+  if (reason == StopReason::kFenced && !stopped.deleted) ++fenced_;
   if (stopped.name.empty()) return;
   directory_.forget(stopped.name);
   if (stopped.scene != nullptr) {

@@ -122,6 +122,7 @@ class ClusterScenes final : public ClusterHost {
     std::shared_ptr<const SceneLease> lease;
     std::string name;  // empty until the scene is read
     ScenePtr scene;    // null until the scene is registered, and if it is damaged
+    bool deleted = false;
   };
 
   // Reads a scene and registers it; tries again later until that succeeds or the leadership ends.
@@ -136,6 +137,8 @@ class ClusterScenes final : public ClusterHost {
   // none.
   std::pair<SceneKey, Led> find_led(const std::string& name) const LOCUS_EXCLUDES(mutex_);
   bool leads(SceneKey key) const LOCUS_EXCLUDES(mutex_);
+  // Ends the leadership of a scene that was deleted, which does not count as fenced.
+  void end_deleted(SceneKey key, const SceneLease& lease) LOCUS_EXCLUDES(mutex_);
   // Runs `job` on a reader's thread, after the earlier jobs of the scene. Does nothing after end().
   void submit(SceneKey key, std::function<void()> job) LOCUS_EXCLUDES(mutex_);
   void write_snapshots(std::chrono::steady_clock::time_point deadline);
